@@ -29,7 +29,8 @@ class RegionGraph:
     source: GraphSource
     shared: Array  # (N, N) shared border length / perimeter of a
     opposite: Array  # (N, N) length of b lying opposite to a boundary side of a / perimeter of a (synthetic: / half perimeter)
-    angle: Array  # (N, N) mesh: antisymmetric change of tilt towards b, rad; real: neighbour angle, rad; synthetic: 1/|difference of region angles|
+    # (N, N) mesh: antisymmetric change of tilt towards b, rad; real: neighbour angle, rad; synthetic: 1/|difference of angles|
+    angle: Array
     neighbour: NDArray[np.bool_]  # (N, N) shares a border
     corner: NDArray[np.bool_]  # (N, N) shares a corner only
     first: NDArray[np.int64]  # (N,) first listed neighbour, -1 without one
