@@ -1,0 +1,161 @@
+"""Policies and the plans they make for tools."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Response
+from pydantic import Field
+
+from app.api.dependencies import Body, Ctx, Json, Paging, RegionOrder, Row, located, page
+from app.api.idempotency import ActionRoute, IdempotencyKey
+from app.workflow import policies as workflow
+
+router = APIRouter(tags=["policies"], route_class=ActionRoute)
+
+
+class Weight(Row):
+    """What one feature costs."""
+
+    key: str
+    label: str
+    symbol: str | None = None
+    value: float
+    identifiable: bool = True
+
+
+class LearnedFrom(Row):
+    """What the policy saw."""
+
+    demonstrations: int
+    answers: int
+
+
+class Policy(Row):
+    """Learned weights and the feature set they belong to."""
+
+    id: str
+    project_id: str
+    run_id: str
+    name: str
+    feature_set: str
+    interactions: list[Json]
+    weights: list[Weight]
+    effort_weights: list[Weight] | None
+    converged: bool
+    learned_from: LearnedFrom
+    created_at: str
+
+
+class PolicyPage(Row):
+    """Part of the list of policies."""
+
+    items: list[Policy]
+    next: str | None
+
+
+class NewPlan(Body):
+    """The tool to plan for."""
+
+    tool_id: Annotated[str, Field(max_length=64)]
+
+
+class WhatIf(Body):
+    """Another order of the same tool."""
+
+    sequence: RegionOrder
+
+
+class PlanFeature(Row):
+    """A column of the cost chart."""
+
+    key: str
+    label: str
+    symbol: str
+
+
+class PlanStep(Row):
+    """A task and what it costs per feature."""
+
+    region: int
+    name: str
+    total: float
+    parts: list[float]
+
+
+class Plan(Row):
+    """The lowest-cost sequence for a tool, and how sure that is."""
+
+    id: str
+    policy_id: str
+    tool_id: str
+    tool_name: str
+    sequence: list[int]
+    cost: float
+    ties: int
+    proved: bool
+    method: str
+    orders: str
+    milliseconds: float
+    effort: float | None
+    tie_settled_by: str | None
+    features: list[PlanFeature]
+    steps: list[PlanStep]
+    demonstrated: bool
+    created_at: str
+
+
+class PlanPage(Row):
+    """Part of the list of plans."""
+
+    items: list[Plan]
+    next: str | None
+
+
+class FeatureDelta(Row):
+    """How much more one feature costs."""
+
+    label: str
+    delta: float
+
+
+class Comparison(Row):
+    """Another order against the plan."""
+
+    cost: float
+    delta: float
+    features: list[FeatureDelta]
+
+
+@router.get("/projects/{project_id}/policies")
+def list_policies(ctx: Ctx, project_id: str, paging: Paging) -> PolicyPage:
+    """The policies of a project."""
+    return PolicyPage.model_validate(page(workflow.list_policies(ctx, project_id), paging))
+
+
+@router.get("/policies/{policy_id}", response_model=Policy)
+def get_policy(ctx: Ctx, policy_id: str) -> Json:
+    """One policy."""
+    return workflow.get_policy(ctx, policy_id)
+
+
+@router.get("/policies/{policy_id}/plans")
+def list_plans(ctx: Ctx, policy_id: str, paging: Paging) -> PlanPage:
+    """The plans made with a policy."""
+    return PlanPage.model_validate(page(workflow.list_plans(ctx, policy_id), paging))
+
+
+@router.post("/policies/{policy_id}/plans", status_code=201, response_model=Plan)
+def make_plan(ctx: Ctx, policy_id: str, body: NewPlan, response: Response, _key: IdempotencyKey = None) -> Json:
+    """The lowest-cost sequence for a tool."""
+    return located(response, "plans", workflow.make_plan(ctx, policy_id, body.tool_id))
+
+
+@router.get("/plans/{plan_id}", response_model=Plan)
+def get_plan(ctx: Ctx, plan_id: str) -> Json:
+    """One plan."""
+    return workflow.get_plan(ctx, plan_id)
+
+
+@router.post("/plans/{plan_id}/what-if", response_model=Comparison)
+def what_if(ctx: Ctx, plan_id: str, body: WhatIf, _key: IdempotencyKey = None) -> Json:
+    """What another order would cost under the same policy."""
+    return workflow.what_if(ctx, plan_id, body.sequence)

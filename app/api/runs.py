@@ -1,0 +1,147 @@
+"""Runs: a learner's life from the first gradient step to the policy."""
+
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Query, Response
+from pydantic import Field
+
+from app.api.dependencies import Body, Ctx, Json, Paging, Row, Seed, located, page
+from app.api.idempotency import ActionRoute, IdempotencyKey
+from app.workflow import runs as workflow
+
+router = APIRouter(tags=["runs"], route_class=ActionRoute)
+
+Kind = Literal["performance", "effort"]
+ParameterName = Annotated[str, Field(max_length=60)]
+ParameterValue = bool | int | float
+
+
+class NewRun(Body):
+    """What to learn; parameters left out take the values of /run-defaults."""
+
+    kind: Kind
+    params: Annotated[dict[ParameterName, ParameterValue], Field(default_factory=dict)]
+    seed: Seed | None = None
+
+
+class Parameter(Row):
+    """A hyperparameter with the paper's symbol."""
+
+    key: str
+    symbol: str
+    label: str
+    value: ParameterValue | None
+    default: ParameterValue | None
+
+
+class ParameterList(Row):
+    """The hyperparameters a new run would have."""
+
+    parameters: list[Parameter]
+
+
+class Terms(Row):
+    """The parts of the loss (Eq. 7)."""
+
+    alpha: float
+    beta: float
+    gamma: float
+    regularisation: float
+
+
+class Run(Row):
+    """Where a learner stands."""
+
+    id: str
+    project_id: str
+    kind: Kind
+    state: str
+    round: int
+    iteration: int
+    loss: float | None
+    terms: Terms | None
+    violations: int | None
+    seed: int
+    params: Json
+    parameters: list[Parameter]
+    open_queries: int
+    asked: int
+    answered: int
+    policy_id: str | None
+    message: str
+    error: Json | str | None
+    tools: list[str]
+    version: int
+    created_at: str
+    updated_at: str
+
+
+class RunPage(Row):
+    """Part of the list of runs."""
+
+    items: list[Run]
+    next: str | None
+
+
+class Metric(Row):
+    """One iteration."""
+
+    iteration: int
+    loss: float
+    terms: Terms
+    violations: int
+
+
+class MetricList(Row):
+    """The learning curve behind an iteration."""
+
+    items: list[Metric]
+    next: None = None
+
+
+@router.get("/projects/{project_id}/runs")
+def list_runs(ctx: Ctx, project_id: str, paging: Paging) -> RunPage:
+    """The runs of a project."""
+    return RunPage.model_validate(page(workflow.list_runs(ctx, project_id), paging))
+
+
+@router.get("/projects/{project_id}/run-defaults", response_model=ParameterList)
+def run_defaults(ctx: Ctx, project_id: str, kind: Kind) -> Json:
+    """The hyperparameters with symbols, words and default values."""
+    return workflow.run_defaults(ctx, project_id, kind)
+
+
+@router.post("/projects/{project_id}/runs", status_code=202, response_model=Run)
+def start_run(ctx: Ctx, project_id: str, body: NewRun, response: Response, _key: IdempotencyKey = None) -> Json:
+    """Start a learner in the background."""
+    return located(response, "runs", workflow.start_run(ctx, project_id, body.kind, body.params, body.seed))
+
+
+@router.get("/runs/{run_id}", response_model=Run)
+def get_run(ctx: Ctx, run_id: str) -> Json:
+    """One run."""
+    return workflow.get_run(ctx, run_id)
+
+
+@router.get("/runs/{run_id}/metrics")
+def metrics(ctx: Ctx, run_id: str, after: Annotated[int, Query(ge=0, lt=2**31, description="Last iteration known.")] = 0) -> MetricList:
+    """Loss, its terms and violations per iteration."""
+    return MetricList(items=[Metric.model_validate(row) for row in workflow.metrics(ctx, run_id, after=after)])
+
+
+@router.post("/runs/{run_id}/cancel", status_code=202, response_model=Run)
+def cancel_run(ctx: Ctx, run_id: str, response: Response, _key: IdempotencyKey = None) -> Json:
+    """Stop the run; open queries are withdrawn."""
+    return located(response, "runs", workflow.cancel(ctx, run_id))
+
+
+@router.post("/runs/{run_id}/resume", status_code=202, response_model=Run)
+def resume_run(ctx: Ctx, run_id: str, response: Response, _key: IdempotencyKey = None) -> Json:
+    """Go on from the last checkpoint of a failed run."""
+    return located(response, "runs", workflow.resume(ctx, run_id))
+
+
+@router.post("/runs/{run_id}/finish", status_code=202, response_model=Run)
+def finish_run(ctx: Ctx, run_id: str, response: Response, _key: IdempotencyKey = None) -> Json:
+    """Accept the weights of a stalled run: everything it could still ask about was called similar."""
+    return located(response, "runs", workflow.finish_run(ctx, run_id))

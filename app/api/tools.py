@@ -1,0 +1,235 @@
+"""Tools: uploads, the two import questions, segmentation, regions."""
+
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, File, Form, Response, UploadFile
+from pydantic import Field
+
+from app import errors
+from app.api.dependencies import Body, Ctx, Json, Name, Paging, RegionId, Row, Version, located, page, tagged
+from app.api.idempotency import ActionRoute, IdempotencyKey
+from app.workflow import tools as workflow
+from app.workflow.context import Context
+
+router = APIRouter(tags=["tools"], route_class=ActionRoute)
+
+Units = Literal["mm", "cm", "m", "in"]
+Up = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+MOST_TABLE_BYTES = 5_000_000
+
+
+class ToolChanges(Body):
+    """Fields left out stay as they are; units and up answer the import questions."""
+
+    name: Name | None = None
+    units: Units | None = None
+    up: Up | None = None
+
+
+class SegmentationOrder(Body):
+    """How finely to cut."""
+
+    target: Annotated[int, Field(ge=1, le=200, description="Regions wanted; left out: decided by the tolerance.")] | None = None
+    tolerance: Annotated[float, Field(gt=0, lt=1, description="Fit error allowed, relative to the part's size.")] | None = None
+
+
+class RegionName(Body):
+    """The name people use for a region."""
+
+    name: Annotated[str, Field(min_length=1, max_length=40)]
+
+
+class JobState(Row):
+    """Progress of background work."""
+
+    id: str
+    fraction: float
+    message: str
+
+
+class ReportLine(Row):
+    """What the import saw or did."""
+
+    level: Literal["info", "repaired", "warning"]
+    text: str
+
+
+class Failure(Row):
+    """Why background work failed."""
+
+    error: str
+    detail: str
+
+
+class Tool(Row):
+    """A part and where its import stands."""
+
+    id: str
+    project_id: str
+    name: str
+    kind: Literal["cad", "table", "sample"]
+    state: Literal["asking", "importing", "ready", "failed"]
+    questions: Json | None
+    units: str | None
+    up: str | None
+    file_name: str | None
+    split: Literal["train", "test"] | None
+    region_count: int | None
+    demonstrated: bool
+    demonstration_id: str | None
+    feature_set: str | None
+    segmentation_id: str | None
+    job: JobState | None
+    report: list[ReportLine]
+    error: Failure | None
+    version: int
+    created_at: str
+
+
+class ToolPage(Row):
+    """Part of the list of tools."""
+
+    items: list[Tool]
+    next: str | None
+
+
+class Region(Row):
+    """One patch of the tool's working surface."""
+
+    id: int
+    name: str
+    description: str
+    area_mm2: float
+    curvature_per_m: float
+    kind: str
+    centroid_mm: list[float]
+    normal: list[float]
+    height: float
+    neighbours: list[int]
+
+
+class RegionList(Row):
+    """All regions of a tool; the position is the region id."""
+
+    items: list[Region]
+    next: None = None
+
+
+@contextmanager
+def stored_upload(ctx: Context, file: UploadFile) -> Iterator[tuple[Path, str]]:
+    """The upload as a file that exists for the duration, and its bare name. The name is never used as a path."""
+    name = Path((file.filename or "").replace("\\", "/")).name or "upload"
+    folder = ctx.settings.data / "uploads"
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.NamedTemporaryFile(dir=folder, suffix=Path(name).suffix[:16]) as stored:
+        shutil.copyfileobj(file.file, stored, 1 << 20)
+        stored.flush()
+        if stored.tell() > ctx.settings.max_upload_mb * 1_000_000:
+            raise errors.TooLarge(f"{name} is larger than {ctx.settings.max_upload_mb} MB, the largest file that is accepted.")
+        yield Path(stored.name), name
+
+
+@router.get("/projects/{project_id}/tools")
+def list_tools(ctx: Ctx, project_id: str, paging: Paging) -> ToolPage:
+    """The tools of a project."""
+    return ToolPage.model_validate(page(workflow.list_tools(ctx, project_id), paging))
+
+
+@router.post("/projects/{project_id}/tools", status_code=201, response_model=Tool)
+def upload_tool(
+    ctx: Ctx,
+    project_id: str,
+    response: Response,
+    file: Annotated[UploadFile, File(description="STEP, IGES, STL, OBJ, PLY, OFF, GLB or 3MF.")],
+    name: Annotated[Name | None, Form()] = None,
+    units: Annotated[Units | None, Form()] = None,
+    up: Annotated[Up | None, Form()] = None,
+    _key: IdempotencyKey = None,
+) -> Json:
+    """Upload CAD. Units and up-direction are asked for where the file doesn't say them."""
+    with stored_upload(ctx, file) as (path, file_name):
+        tool = workflow.upload_tool(ctx, project_id, path, file_name, name=name, units=units, up=up)
+    return located(response, "tools", tool)
+
+
+@router.post("/projects/{project_id}/tools/region-table", status_code=201, response_model=Tool)
+def import_region_table(
+    ctx: Ctx,
+    project_id: str,
+    response: Response,
+    file: Annotated[UploadFile, File(description="CSV in the layout of the paper's authors.")],
+    layout: Annotated[Literal["synthetic", "real"] | None, Form(description="Left out: recognised from the header.")] = None,
+    _key: IdempotencyKey = None,
+) -> Json:
+    """Import a region table; the expert's sequence in it becomes a demonstration."""
+    with stored_upload(ctx, file) as (path, file_name):
+        text = table_text(path, file_name)
+    return located(response, "tools", workflow.import_region_table(ctx, project_id, text, file_name, layout=layout))
+
+
+def table_text(path: Path, file_name: str) -> str:
+    """The table as text.
+
+    Raises:
+        InvalidInput: Too long for a table, or not UTF-8 text.
+    """
+    if path.stat().st_size > MOST_TABLE_BYTES:
+        raise errors.TooLarge(f"{file_name} is larger than {MOST_TABLE_BYTES // 1_000_000} MB; a region table is a short CSV file.")
+    try:
+        return path.read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise errors.MalformedTable(f"{file_name} is not text; a region table is a CSV file in UTF-8.") from error
+
+
+@router.get("/tools/{tool_id}", response_model=Tool)
+def get_tool(ctx: Ctx, tool_id: str, response: Response) -> Json:
+    """One tool."""
+    return tagged(response, workflow.get_tool(ctx, tool_id))
+
+
+@router.patch("/tools/{tool_id}", response_model=Tool)
+def answer_tool(ctx: Ctx, tool_id: str, body: ToolChanges, version: Version, response: Response) -> Json:
+    """Rename the tool, or answer what its import asks."""
+    changes = body.model_dump(exclude_none=True)
+    return tagged(response, workflow.answer_tool(ctx, tool_id, changes, version))
+
+
+@router.delete("/tools/{tool_id}", status_code=204)
+def delete_tool(ctx: Ctx, tool_id: str, version: Version) -> None:
+    """Put the tool away; refused while a run trains on it."""
+    workflow.delete_tool(ctx, tool_id, version)
+
+
+@router.post("/tools/{tool_id}/restore", response_model=Tool)
+def restore_tool(ctx: Ctx, tool_id: str, response: Response, _key: IdempotencyKey = None) -> Json:
+    """Undo the deletion."""
+    return tagged(response, workflow.restore_tool(ctx, tool_id))
+
+
+@router.post("/tools/{tool_id}/segmentations", status_code=202, response_model=Tool)
+def segment_tool(ctx: Ctx, tool_id: str, body: SegmentationOrder, response: Response, _key: IdempotencyKey = None) -> Json:
+    """Cut the tool again; demonstrations keep the segmentation they were clicked on."""
+    return located(response, "tools", workflow.segment_tool(ctx, tool_id, body.model_dump(exclude_none=True)))
+
+
+@router.get("/tools/{tool_id}/regions")
+def list_regions(ctx: Ctx, tool_id: str) -> RegionList:
+    """The regions with what the features see of them."""
+    return RegionList(items=[Region.model_validate(row) for row in workflow.list_regions(ctx, tool_id)])
+
+
+@router.patch("/tools/{tool_id}/regions/{region}", response_model=Region)
+def rename_region(ctx: Ctx, tool_id: str, region: RegionId, body: RegionName) -> Json:
+    """Give a region another name."""
+    return workflow.rename_region(ctx, tool_id, region, body.name)
+
+
+@router.get("/tools/{tool_id}/mesh.glb", response_class=Response, responses={200: {"content": {"model/gltf-binary": {}}}})
+def mesh_glb(ctx: Ctx, tool_id: str) -> Response:
+    """The cleaned surface, one node per region, in metres."""
+    return Response(workflow.mesh_glb(ctx, tool_id), media_type="model/gltf-binary")
