@@ -1,0 +1,103 @@
+// A 3D view: the viser page of one session in a frame, steered over REST.
+//
+//   const view = new View3D(host, { projectId, name: "main" });
+//   view.show({ mode: "sequence", tool_id, sequence, step }, "Trough 10 with your order after step 4");
+//   view.onPicked((region) => ...);
+//
+// The host is a .stage element; the frame is laid under what else it holds. For screen readers the view is one image with the
+// sentence given to `show`; the lists beside it say and do the same. The session id is kept in sessionStorage per project and
+// name, so a reload finds its view again. Scenes are sent one at a time and only the latest waiting one, so dragging a slider
+// never builds a queue. The theme goes along as `dark`.
+
+import { get, post, put } from "./api.js";
+import { h } from "./dom.js";
+import { listen } from "./events.js";
+import { adopt } from "./keys.js";
+import { isDark } from "./shell.js";
+import { complain } from "./toasts.js";
+
+export class View3D {
+  constructor(host, { projectId, name = "main" }) {
+    this.projectId = projectId;
+    this.slot = `apprentice-view:${projectId}:${name}`;
+    this.box = h("div.view3d", { role: "img", "aria-label": "3D view, loading" }, h("div.view3d-wait.skeleton"));
+    host.prepend(this.box);
+    this.session = null;
+    this.wanted = null;
+    this.sending = false;
+    this.sent = "";
+    this.ready = this.open().catch((error) => this.fail(error));
+    addEventListener("themechange", () => this.scene && this.show(this.scene, this.sentence));
+    listen("resync", () => {
+      this.sent = "";
+      if (this.scene) this.show(this.scene, this.sentence);
+    });
+  }
+
+  async open() {
+    this.session = (await this.find()) ?? (await post("/sessions", { project_id: this.projectId }));
+    sessionStorage.setItem(this.slot, this.session.id);
+    this.frame = h("iframe", { src: `${this.session.url}?hideViserLogo${isDark() ? "&darkMode" : ""}`, title: "3D view", tabindex: "-1", onload: () => this.loaded() });
+    this.box.append(this.frame);
+    await this.flush();
+  }
+
+  async find() {
+    const known = sessionStorage.getItem(this.slot);
+    if (!known) return null;
+    try {
+      return await get(`/sessions/${encodeURIComponent(known)}`);
+    } catch (error) {
+      if (error.status === 404) return null;
+      throw error;
+    }
+  }
+
+  loaded() {
+    adopt(this.frame.contentWindow);
+    this.box.querySelector(".view3d-wait")?.remove();
+    this.frame.classList.add("shown");
+  }
+
+  fail(error) {
+    this.box.querySelector(".view3d-wait")?.remove();
+    this.box.append(h("p.view3d-fault", { role: "alert" }, `The 3D view cannot be opened. ${error.message} The list beside it still works.`));
+  }
+
+  // Shows a scene (see the REST description of sessions) and says it in a sentence.
+  show(scene, sentence) {
+    this.scene = scene;
+    this.sentence = sentence;
+    this.box.setAttribute("aria-label", sentence);
+    this.wanted = { ...scene, dark: isDark() };
+    return this.flush();
+  }
+
+  async flush() {
+    if (this.sending || !this.session) return;
+    this.sending = true;
+    try {
+      while (this.wanted) {
+        const scene = this.wanted;
+        this.wanted = null;
+        const text = JSON.stringify(scene);
+        if (text === this.sent) continue;
+        await put(`/sessions/${encodeURIComponent(this.session.id)}/scene`, scene);
+        this.sent = text;
+      }
+    } catch (error) {
+      complain(error);
+    } finally {
+      this.sending = false;
+    }
+  }
+
+  // Robot playback: action "play", "pause" or "seek".
+  control(action, values = {}) {
+    return post(`/sessions/${encodeURIComponent(this.session.id)}/playback`, { action, ...values });
+  }
+
+  onPicked(handler) {
+    return listen("session.picked", ({ session_id: session, region }) => session === this.session?.id && handler(region));
+  }
+}
