@@ -1,0 +1,155 @@
+"""Dynamic programs over sets of finished regions, compiled.
+
+A state is a bit mask of finished regions; bit a is region a. Every successor of a state is a larger number, so one pass
+from the full set downwards meets each state after its successors. Negative costs are no problem, unlike for Dijkstra.
+"""
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from app.geometry.tool import Array
+
+
+@nb.njit(cache=True)
+def lowest_to_go(c: Array, n: int) -> Array:
+    """Cheapest cost from every state to the full set, (2^n,). `c` is (2^n, n)."""
+    full = (1 << n) - 1
+    v = np.zeros(full + 1)
+    for s in range(full - 1, -1, -1):
+        best = np.inf
+        for a in range(n):
+            if not (s >> a) & 1:
+                best = min(best, c[s, a] + v[s | 1 << a])
+        v[s] = best
+    return v
+
+
+@nb.njit(cache=True)
+def range_to_go(g: Array, n: int) -> tuple[Array, Array]:
+    """Smallest and largest total still possible from every state for one quantity g (2^n, n)."""
+    full = (1 << n) - 1
+    low, high = np.zeros(full + 1), np.zeros(full + 1)
+    for s in range(full - 1, -1, -1):
+        lo, hi = np.inf, -np.inf
+        for a in range(n):
+            if not (s >> a) & 1:
+                t = s | 1 << a
+                lo, hi = min(lo, g[s, a] + low[t]), max(hi, g[s, a] + high[t])
+        low[s], high[s] = lo, hi
+    return low, high
+
+
+@nb.njit(cache=True)
+def count_lowest(c: Array, v: Array, n: int, tolerance: float) -> NDArray[np.int64]:
+    """Number of cheapest completions of every state, (2^n,). Fits 64 bits up to n = 20, where 20! orders are 2.4e18."""
+    full = (1 << n) - 1
+    ties = np.zeros(full + 1, np.int64)
+    ties[full] = 1
+    for s in range(full - 1, -1, -1):
+        for a in range(n):
+            t = s | 1 << a
+            if t != s and c[s, a] + v[t] <= v[s] + tolerance:
+                ties[s] += ties[t]
+    return ties
+
+
+@nb.njit(cache=True)
+def distinct_classes(c: Array, n: int, k: int, tolerance: float) -> tuple[Array, NDArray[np.int64]]:
+    """The k lowest distinct totals from every state and how many completions have each: two arrays (2^n, k).
+
+    A k-way merge of the successors' sorted lists; a total joins the class opened below it when within the tolerance.
+    """
+    full = (1 << n) - 1
+    best, many = np.full((full + 1, k), np.inf), np.zeros((full + 1, k), np.int64)
+    best[full, 0], many[full, 0] = 0.0, 1
+    head = np.zeros(n, np.int64)
+    for s in range(full - 1, -1, -1):
+        head[:] = 0
+        last = -1
+        while True:
+            value, who = np.inf, -1
+            for a in range(n):
+                if not (s >> a) & 1 and head[a] < k:
+                    x = c[s, a] + best[s | 1 << a, head[a]]
+                    if x < value:
+                        value, who = x, a
+            if who < 0:
+                break
+            t = s | 1 << who
+            if last >= 0 and value - best[s, last] <= tolerance:
+                many[s, last] += many[t, head[who]]
+            else:
+                last += 1
+                if last == k:
+                    break
+                best[s, last], many[s, last] = value, many[t, head[who]]
+            head[who] += 1
+    return best, many
+
+
+@nb.njit(cache=True)
+def members_within(
+    g: Array, n: int, target: Array, low: Array, high: Array, slack: Array, cap: int
+) -> tuple[NDArray[np.int64], bool]:
+    """Orders whose totals of all P quantities equal `target` within `slack`, lowest ids first, at most `cap` of them.
+
+    Depth-first; a prefix is dropped when some remaining total leaves what is still possible. `g` is (2^n, n, P), `low`
+    and `high` are (2^n, P). Returns the orders (found, n) and whether these are all.
+    """
+    width, full = g.shape[2], (1 << n) - 1
+    out = np.zeros((cap, n), np.int64)
+    spent, state, todo = np.zeros((n + 1, width)), np.zeros(n + 1, np.int64), np.zeros(n + 1, np.int64)
+    depth, found = 0, 0
+    while depth >= 0:
+        s, a = state[depth], todo[depth]
+        if a == n:
+            depth -= 1
+            continue
+        todo[depth] = a + 1
+        t = s | 1 << a
+        if t == s:
+            continue
+        possible = True
+        for p in range(width):
+            spent[depth + 1, p] = spent[depth, p] + g[s, a, p]
+            rest = target[p] - spent[depth + 1, p]
+            if rest < low[t, p] - slack[p] or rest > high[t, p] + slack[p]:
+                possible = False
+                break
+        if not possible:
+            continue
+        if t == full:
+            if found == cap:
+                return out, False
+            for q in range(n):
+                out[found, q] = todo[q] - 1
+            found += 1
+            continue
+        depth += 1
+        state[depth], todo[depth] = t, 0
+    return out[:found], True
+
+
+@nb.njit(cache=True)
+def last_regions(c: Array, v: Array, n: int, tolerance: float) -> NDArray[np.int64]:
+    """Bit mask of the regions that some cheapest completion of each state ends with, (2^n,)."""
+    full = (1 << n) - 1
+    last = np.zeros(full + 1, np.int64)
+    for s in range(full - 1, -1, -1):
+        for a in range(n):
+            t = s | 1 << a
+            if t != s and c[s, a] + v[t] <= v[s] + tolerance:
+                last[s] |= 1 << a if t == full else last[t]
+    return last
+
+
+def warm_up() -> None:
+    """Compile or load every kernel, so that the first click doesn't wait for it."""
+    c = np.ones((4, 2))
+    v = lowest_to_go(c, 2)
+    range_to_go(c, 2)
+    count_lowest(c, v, 2, 1e-9)
+    last_regions(c, v, 2, 1e-9)
+    distinct_classes(c, 2, 2, 1e-9)
+    members_within(c[:, :, None], 2, np.array([2.0]), v[:, None], v[:, None], np.array([1e-9]), 2)
