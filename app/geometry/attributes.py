@@ -1,0 +1,99 @@
+"""What each region is like: area, normal, curvature, kind, height, plan view."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.geometry.fitting import CYLINDER, KINDS, NORMAL_WEIGHT, SIZE, SPHERE, face_sums, fit
+from app.geometry.tool import Array, Mesh
+
+PRIMITIVE_ERROR = 0.02  # RMS cost of a primitive / size of the region above which it is called free-form
+FLAT_TURN = np.radians(3)  # a region whose primitive bends less than this over its size counts as a plane
+
+
+@dataclass(frozen=True)
+class Attributes:
+    """Per region, in the order of the labels."""
+
+    area: Array  # (n,) m^2
+    projected: Array  # (n,) m^2 seen from above
+    centroid: Array  # (n, 3) m
+    normal: Array  # (n, 3) unit, area mean
+    curvature: Array  # (n,) signed dominant principal curvature, 1/m, + convex
+    kind: tuple[str, ...]  # "plane" | "cylinder" | "sphere" | "freeform"
+    low: Array  # (n, 3) lower corner of the box, m
+    high: Array  # (n, 3) upper corner of the box, m
+
+
+def find_attributes(mesh: Mesh, labels: NDArray[np.int32]) -> Attributes:
+    """Measure every region."""
+    n = int(labels.max()) + 1
+    corners = mesh.vertices[mesh.faces]
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
+    face_area = np.linalg.norm(cross, axis=1)
+    inside = labels >= 0
+
+    def total(values: Array) -> Array:
+        return np.bincount(labels[inside], weights=values[inside], minlength=n)
+
+    area = total(face_area)
+    centres = corners.mean(axis=1)
+    centroid = np.stack([total(face_area * centres[:, k]) for k in range(3)], axis=1) / area[:, None]
+    normal = np.stack([total(cross[:, k]) for k in range(3)], axis=1)
+    size = np.linalg.norm(normal, axis=1)
+    # a region that closes on itself (a ring wall) has no mean normal; call it upright
+    normal = np.where((size > 1e-6 * area)[:, None], normal / np.maximum(size, 1e-300)[:, None], [0.0, 0.0, 1.0])
+    low, high = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)
+    for k in range(3):
+        np.minimum.at(low, labels[inside], corners[inside, k])
+        np.maximum.at(high, labels[inside], corners[inside, k])
+    bends = [region_shape(mesh, np.flatnonzero(labels == a)) for a in range(n)]
+    curvature, kind = np.array([b for b, _ in bends]), tuple(k for _, k in bends)
+    return Attributes(area, total(np.abs(cross[:, 2])), centroid, normal, curvature, kind, low, high)
+
+
+def region_shape(mesh: Mesh, faces: NDArray[np.int64]) -> tuple[float, str]:
+    """Signed dominant curvature (1/m) and kind of one region.
+
+    Paper: curvature comes from the fitted primitive, 1/r; where none fits, from how the normals turn over the region.
+    """
+    corners = mesh.vertices[mesh.faces[faces]]
+    middle = (corners.min(axis=(0, 1)) + corners.max(axis=(0, 1))) / 2
+    scale = float(np.linalg.norm(np.ptp(corners.reshape(-1, 3), axis=0)))
+    used, compact = np.unique(mesh.faces[faces], return_inverse=True)
+    sums = face_sums((mesh.vertices[used] - middle) / scale, compact.reshape(-1, 3)).sum(axis=0)
+    out = np.empty(5)
+    cost = float(fit(sums, NORMAL_WEIGHT, out))
+    kind = int(out[0])
+    if np.sqrt(cost / sums[SIZE - 1]) <= PRIMITIVE_ERROR:
+        if kind in (SPHERE, CYLINDER) and abs(out[1]) < FLAT_TURN:
+            return 0.0, "plane"
+        return float(out[1]) / scale, KINDS[kind]
+    return turning_curvature(corners), "freeform"
+
+
+def turning_curvature(corners: Array) -> float:
+    """Larger principal curvature (by size) of the shape operator that best explains how face normals turn.
+
+    Least squares of n(x) = n0 + S (x - x0) in the tangent plane, S symmetric; works on long thin triangles.
+    """
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    twice = np.linalg.norm(cross, axis=1)
+    mean = cross.sum(axis=0)
+    if np.linalg.norm(mean) < 1e-6 * twice.sum():
+        return 0.0
+    mean /= np.linalg.norm(mean)
+    axis = np.eye(3)[np.argmin(np.abs(mean))]
+    u = np.cross(mean, axis) / np.linalg.norm(np.cross(mean, axis))
+    frame = np.stack([u, np.cross(mean, u)])
+    weight = twice / twice.sum()
+    place, turn = corners.mean(axis=1) @ frame.T, (cross / twice[:, None]) @ frame.T
+    place, turn = place - weight @ place, turn - weight @ turn
+    x, y = place.T
+    zero = np.zeros_like(x)
+    rows = np.concatenate([np.stack([x, y, zero], axis=1), np.stack([zero, x, y], axis=1)])
+    both = np.sqrt(np.concatenate([weight, weight]))
+    (xx, xy, yy), *_ = np.linalg.lstsq(rows * both[:, None], np.concatenate([turn[:, 0], turn[:, 1]]) * both, rcond=1e-9)
+    principal = np.linalg.eigvalsh(np.array([[xx, xy], [xy, yy]]))
+    return float(principal[np.argmax(np.abs(principal))])

@@ -1,0 +1,143 @@
+"""Where regions meet: shared lengths, free borders, corners, and which neighbour lies opposite a free side."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import ConvexHull, QhullError
+
+from app.geometry.cleaning import edge_table
+from app.geometry.tool import Array, Mesh
+
+Integers = NDArray[np.int64]
+FREE = -1  # beyond a free border
+
+
+@dataclass(frozen=True)
+class Borders:
+    """Border edges of all regions; an edge between two regions is listed once from each side."""
+
+    region: Integers  # (B,) whose border it is
+    beyond: Integers  # (B,) region on the other side, FREE without one
+    ends: Integers  # (B, 2) vertices
+    length: Array  # (B,) metres
+
+    def shared(self, n: int) -> Array:
+        """Length of the border between regions (n, n), metres."""
+        inner = self.beyond != FREE
+        matrix = np.zeros((n, n))
+        np.add.at(matrix, (self.region[inner], self.beyond[inner]), self.length[inner])
+        return matrix
+
+    def perimeter(self, n: int) -> Array:
+        """Whole border of each region, free parts included (n,), metres."""
+        return np.bincount(self.region, weights=self.length, minlength=n)
+
+
+def find_borders(mesh: Mesh, labels: NDArray[np.int32]) -> Borders:
+    """Edges where the region changes, the working surface ends, or the mesh isn't a surface (1 or more than 2 faces)."""
+    edges, side_edge, count = edge_table(mesh.faces.astype(np.int64))
+    flat = side_edge.ravel()
+    owner = np.repeat(labels.astype(np.int64), 3)
+    order = np.argsort(flat, kind="stable")
+    start = np.concatenate([[0], np.cumsum(count)[:-1]])
+    beyond = np.full(len(flat), FREE)
+    two = np.flatnonzero(count == 2)
+    first, second = order[start[two]], order[start[two] + 1]
+    beyond[first], beyond[second] = owner[second], owner[first]
+    crowded = _inside_crowded(edges, flat, owner, count)
+    listed = (owner >= 0) & (beyond != owner) & ~crowded
+    ends = edges[flat[listed]]
+    length = np.linalg.norm(mesh.vertices[ends[:, 0]] - mesh.vertices[ends[:, 1]], axis=1)
+    return Borders(owner[listed], beyond[listed], ends, length)
+
+
+def _inside_crowded(edges: Integers, flat: Integers, owner: Integers, count: Integers) -> NDArray[np.bool_]:
+    """Sides at edges with more than two faces whose faces all belong to one region: not a border."""
+    low, high = np.full(len(edges), np.iinfo(np.int64).max), np.full(len(edges), -2)
+    np.minimum.at(low, flat, owner)
+    np.maximum.at(high, flat, owner)
+    return (count > 2)[flat] & (low == high)[flat]
+
+
+def corner_neighbours(mesh: Mesh, labels: NDArray[np.int32], shared: Array) -> NDArray[np.bool_]:
+    """Pairs of regions (n, n) that have a vertex but no border in common."""
+    n = len(shared)
+    inside = labels >= 0
+    vertex, region = mesh.faces[inside].ravel(), np.repeat(labels[inside], 3)
+    incidence = coo_matrix((np.ones(len(vertex)), (region, vertex)), shape=(n, len(mesh.vertices))).tocsr()
+    touching = (incidence @ incidence.T).toarray() > 0
+    np.fill_diagonal(touching, False)
+    return touching & ~(shared > 0)
+
+
+def opposite_lengths(mesh: Mesh, borders: Borders, normals: Array) -> Array:
+    """Length of b on the side opposite to a free side of a (n, n), metres.
+
+    The outer border of a region, seen along its mean normal, is dealt to the four sides of its smallest rectangle. A side
+    that is only partly free counts with its free share.
+
+    Paper: the boundary-edge features (3, 4) count, per free side of a region, the neighbours across from it.
+    """
+    n = len(normals)
+    result = np.zeros((n, n))
+    for a in range(n):
+        mine = borders.region == a
+        ends, beyond, length = borders.ends[mine], borders.beyond[mine], borders.length[mine]
+        if not (beyond == FREE).any() or (beyond == FREE).all():
+            continue
+        outer = _outer_loop(ends, length)
+        ends, beyond, length = ends[outer], beyond[outer], length[outer]
+        flat = mesh.vertices[ends] @ tangent_frame(normals[a]).T  # (B, 2, 2)
+        side = _rectangle_side(flat)
+        whole = np.bincount(side, weights=length, minlength=4)
+        free = np.bincount(side, weights=length * (beyond == FREE), minlength=4) / np.maximum(whole, 1e-300)
+        inner = beyond != FREE
+        across = (side[inner] + 2) % 4
+        np.add.at(result[a], beyond[inner], length[inner] * free[across])
+    return result
+
+
+def tangent_frame(normal: Array) -> Array:
+    """Two unit vectors (2, 3) across `normal`; the first is horizontal, along x for a level region."""
+    right = np.array([1.0, 0.0, 0.0]) if abs(normal[2]) > 0.999 else np.cross([0.0, 0.0, 1.0], normal)
+    right = right - (right @ normal) * normal
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(normal, right)])
+
+
+def _outer_loop(ends: Integers, length: Array) -> NDArray[np.bool_]:
+    """Edges of the longest connected loop; the others bound holes."""
+    _, at = np.unique(ends, return_inverse=True)
+    at = at.reshape(-1, 2)
+    size = int(at.max()) + 1
+    graph = coo_matrix((np.ones(len(at)), (at[:, 0], at[:, 1])), shape=(size, size))
+    _, loop = connected_components(graph, directed=False)
+    return loop[at[:, 0]] == np.argmax(np.bincount(loop[at[:, 0]], weights=length))
+
+
+def _rectangle_side(flat: Array) -> Integers:
+    """Nearest side 0..3 (+u, +v, -u, -v) of the smallest rectangle for each edge (B, 2, 2)."""
+    axes = smallest_rectangle(flat.reshape(-1, 2))
+    low, high = (flat.reshape(-1, 2) @ axes.T).min(axis=0), (flat.reshape(-1, 2) @ axes.T).max(axis=0)
+    middle = flat.mean(axis=1) @ axes.T
+    away = np.concatenate([high - middle, middle - low], axis=1)  # (B, 4): +u, +v, -u, -v
+    return np.argmin(away, axis=1)
+
+
+def smallest_rectangle(points: Array) -> Array:
+    """Axes (2, 2) of the rectangle with the smallest area around the points; one side lies on the hull."""
+    try:
+        hull = points[ConvexHull(points).vertices]
+    except QhullError:  # all points on one line
+        along = points[np.argmax(np.linalg.norm(points - points[0], axis=1))] - points[0]
+        size = np.linalg.norm(along)
+        u = along / size if size > 0 else np.array([1.0, 0.0])
+        return np.stack([u, [-u[1], u[0]]])
+    edge = np.roll(hull, -1, axis=0) - hull
+    u = edge / np.linalg.norm(edge, axis=1)[:, None]
+    along, across = hull @ u.T, hull @ np.stack([-u[:, 1], u[:, 0]])
+    best = u[np.argmin(np.ptp(along, axis=0) * np.ptp(across, axis=0))]
+    return np.stack([best, [-best[1], best[0]]])

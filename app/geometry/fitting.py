@@ -1,0 +1,186 @@
+"""Fit plane, sphere and cylinder to a cluster of triangles from 54 additive numbers, in constant time.
+
+Sums over a cluster (weights: a third of the triangle's area at each corner, exact on CAD tessellations whose corners lie
+on the true surface): 35 monomials of the position up to degree 4; area-weighted normal (3), normal x normal (6),
+normal x centre (9); area (1). Adding two clusters adds their numbers.
+
+Any squared-distance-like function is linear in the ten monomials q = (1, x, y, z, xx, yy, zz, xy, xz, yz), so the algebraic
+fits only need products u . (sum q q^T) . v. Paper: Sec. V segments with hierarchical fitting primitives (its citation 34).
+"""
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from app.geometry.tool import Array
+
+_QUADRATIC = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (2, 0, 0), (0, 2, 0), (0, 0, 2), (1, 1, 0), (1, 0, 1), (0, 1, 1))
+_MONOMIALS = sorted({tuple(a + b for a, b in zip(p, q, strict=True)) for p in _QUADRATIC for q in _QUADRATIC}, key=lambda e: (sum(e), e))
+PRODUCT = np.array([[_MONOMIALS.index(tuple(a + b for a, b in zip(p, q, strict=True))) for q in _QUADRATIC] for p in _QUADRATIC])
+SQUARE = np.array([[4, 7, 8], [7, 5, 9], [8, 9, 6]])  # position in q of x_a x_b
+NORMAL, NORMAL2, NORMAL_CENTRE, AREA, SIZE = 35, 38, 44, 53, 54
+_NORMAL2_AT = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
+PLANE, SPHERE, CYLINDER = 0, 1, 2
+KINDS = ("plane", "sphere", "cylinder")
+NO_FIT = 1e300
+NORMAL_WEIGHT = 0.003  # lambda: how far (in diagonals) a normal error of 1 counts as a distance
+LARGEST_RADIUS = 1e3  # diagonals; flatter is a plane
+
+
+def face_sums(vertices: Array, faces: NDArray[np.integer]) -> Array:
+    """The 54 numbers of every face (F, 54); vertices should be centred and of unit size."""
+    corners = vertices[faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    twice = np.linalg.norm(normal, axis=1)
+    area = twice / 2
+    normal = normal / np.maximum(twice, 1e-300)[:, None]
+    power = np.stack([corners**d for d in range(5)], axis=-1)  # (F, 3, 3, 5)
+    sums = np.empty((len(faces), SIZE))
+    for at, (i, j, k) in enumerate(_MONOMIALS):
+        sums[:, at] = area / 3 * (power[:, :, 0, i] * power[:, :, 1, j] * power[:, :, 2, k]).sum(axis=1)
+    sums[:, NORMAL:NORMAL2] = area[:, None] * normal
+    for at, (a, b) in enumerate(((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))):
+        sums[:, NORMAL2 + at] = area * normal[:, a] * normal[:, b]
+    sums[:, NORMAL_CENTRE:AREA] = (area[:, None, None] * normal[:, :, None] * corners.mean(axis=1)[:, None, :]).reshape(-1, 9)
+    sums[:, AREA] = area
+    return sums
+
+
+@nb.njit(cache=True)
+def _smallest_eigen(s, vector):  # pragma: no cover - compiled
+    """Smallest eigenvalue of the symmetric s (3, 3), which is overwritten; fills its unit eigenvector (cyclic Jacobi)."""
+    u = np.eye(3)
+    for _ in range(15):
+        off = abs(s[0, 1]) + abs(s[0, 2]) + abs(s[1, 2])
+        if off <= 1e-17 * (abs(s[0, 0]) + abs(s[1, 1]) + abs(s[2, 2])):
+            break
+        for p in range(2):
+            for q in range(p + 1, 3):
+                if s[p, q] == 0.0:
+                    continue
+                half = 0.5 * np.arctan2(2 * s[p, q], s[p, p] - s[q, q])
+                c, d = np.cos(half), np.sin(half)
+                for k in range(3):
+                    x, y = s[k, p], s[k, q]
+                    s[k, p], s[k, q] = c * x + d * y, c * y - d * x
+                for k in range(3):
+                    x, y = s[p, k], s[q, k]
+                    s[p, k], s[q, k] = c * x + d * y, c * y - d * x
+                for k in range(3):
+                    x, y = u[k, p], u[k, q]
+                    u[k, p], u[k, q] = c * x + d * y, c * y - d * x
+    least = 0
+    for k in range(1, 3):
+        if s[k, k] < s[least, least]:
+            least = k
+    for k in range(3):
+        vector[k] = u[k, least]
+    return s[least, least]
+
+
+@nb.njit(cache=True)
+def _solve3(a, b):  # pragma: no cover - compiled
+    """Cramer's rule, b becomes the solution; False when singular."""
+    c00 = a[1, 1] * a[2, 2] - a[1, 2] * a[2, 1]
+    c01 = a[1, 2] * a[2, 0] - a[1, 0] * a[2, 2]
+    c02 = a[1, 0] * a[2, 1] - a[1, 1] * a[2, 0]
+    det = a[0, 0] * c00 + a[0, 1] * c01 + a[0, 2] * c02
+    if abs(det) < 1e-13:
+        return False
+    x = (b[0] * c00 + b[1] * (a[0, 2] * a[2, 1] - a[0, 1] * a[2, 2]) + b[2] * (a[0, 1] * a[1, 2] - a[0, 2] * a[1, 1])) / det
+    y = (b[0] * c01 + b[1] * (a[0, 0] * a[2, 2] - a[0, 2] * a[2, 0]) + b[2] * (a[0, 2] * a[1, 0] - a[0, 0] * a[1, 2])) / det
+    z = (b[0] * c02 + b[1] * (a[0, 1] * a[2, 0] - a[0, 0] * a[2, 1]) + b[2] * (a[0, 0] * a[1, 1] - a[0, 1] * a[1, 0])) / det
+    b[0], b[1], b[2] = x, y, z
+    return True
+
+
+@nb.njit(cache=True)
+def _round_fit(m, across, spread, g, centre):  # pragma: no cover - compiled
+    """Algebraic sphere (across = identity) or cylinder (across drops the axis): int (s - 2 c.x - d)^2 / (4 r^2).
+
+    Here x is the position from the centroid g and s = x^T across x. Fills centre; returns (error, radius).
+    """
+    w = m[0]
+    row = np.zeros(10)  # s as a combination of the monomials q
+    ag = across @ g
+    row[0] = g[0] * ag[0] + g[1] * ag[1] + g[2] * ag[2]
+    for a in range(3):
+        row[1 + a] = -2 * ag[a]
+        for b in range(3):
+            row[SQUARE[a, b]] += across[a, b]
+    sq = np.zeros(10)  # sum of s times each monomial
+    for i in range(10):
+        for j in range(10):
+            sq[i] += row[j] * m[PRODUCT[i, j]]
+    ss, s1 = 0.0, sq[0]
+    for i in range(10):
+        ss += row[i] * sq[i]
+    flat = across @ spread @ across
+    trace = flat[0, 0] + flat[1, 1] + flat[2, 2]
+    if trace <= 0:
+        return NO_FIT, 0.0
+    lhs, c, sx = np.empty((3, 3)), np.empty(3), np.empty(3)
+    for a in range(3):
+        sx[a] = sq[1 + a] - g[a] * s1
+    c[:] = across @ sx / (2 * trace)
+    for a in range(3):
+        for b in range(3):
+            lhs[a, b] = flat[a, b] / trace + ((1.0 if a == b else 0.0) - across[a, b])  # identity along the axis
+    if not _solve3(lhs, c):
+        return NO_FIT, 0.0
+    r2 = c[0] * c[0] + c[1] * c[1] + c[2] * c[2] + s1 / w
+    if r2 <= 0 or r2 > LARGEST_RADIUS * LARGEST_RADIUS:
+        return NO_FIT, 0.0
+    error = ss - s1 * s1 / w
+    for a in range(3):
+        error -= 4 * c[a] * sx[a]
+        for b in range(3):
+            error += 4 * c[a] * spread[a, b] * c[b]
+        centre[a] = g[a] + c[a]
+    return max(error, 0.0) / (4 * r2), np.sqrt(r2)
+
+
+@nb.njit(cache=True)
+def fit(m, weight, out):  # pragma: no cover - compiled
+    """Cost of the best primitive: int distance^2 + weight^2 int |n - n_primitive|^2.
+
+    Fills out with the kind, the signed curvature 1/r (+ convex) and the cylinder's axis (3). Without the normal term any
+    two triangles would merge across a crease for nothing, as a sphere fits them exactly.
+    """
+    w = m[0]
+    g, axis, centre = np.empty(3), np.empty(3), np.empty(3)
+    spread, work = np.empty((3, 3)), np.empty((3, 3))
+    for a in range(3):
+        g[a] = m[PRODUCT[0, 1 + a]] / w
+    for a in range(3):
+        for b in range(3):
+            spread[a, b] = work[a, b] = m[PRODUCT[1 + a, 1 + b]] - w * g[a] * g[b]
+    flatness = _smallest_eigen(work, axis)
+    along = abs(m[NORMAL] * axis[0] + m[NORMAL + 1] * axis[1] + m[NORMAL + 2] * axis[2])
+    best = max(flatness, 0.0) + 2 * weight * weight * max(m[AREA] - along, 0.0)
+    out[0], out[1], out[2], out[3], out[4] = PLANE, 0.0, 0.0, 0.0, 0.0
+    across = np.eye(3)
+    for kind in range(SPHERE, CYLINDER + 1):
+        if kind == CYLINDER:  # the axis is the direction that normals avoid
+            for a in range(3):
+                for b in range(3):
+                    work[a, b] = m[NORMAL2 + _NORMAL2_AT[a, b]]
+            _smallest_eigen(work, axis)
+            for a in range(3):
+                for b in range(3):
+                    across[a, b] -= axis[a] * axis[b]
+        error, radius = _round_fit(m, across, spread, g, centre)
+        if error >= NO_FIT:
+            continue
+        radial = 0.0  # sum of A n . across (x - centre): positive when normals point away from the centre
+        for a in range(3):
+            for b in range(3):
+                radial += across[a, b] * (m[NORMAL_CENTRE + 3 * a + b] - m[NORMAL + a] * centre[b])
+        sign = 1.0 if radial >= 0 else -1.0
+        error += 2 * weight * weight * max(m[AREA] - sign * radial / radius, 0.0)
+        if error < best:
+            best = error
+            out[0], out[1] = kind, sign / radius
+            for a in range(3):
+                out[2 + a] = axis[a] if kind == CYLINDER else 0.0
+    return best

@@ -1,0 +1,121 @@
+"""Labelled mesh -> Tool: regions in reading order with their graph, attributes and descriptions (Sec. V)."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.errors import InvalidInput
+from app.geometry.attributes import Attributes, find_attributes
+from app.geometry.borders import corner_neighbours, find_borders, opposite_lengths
+from app.geometry.descriptions import describe
+from app.geometry.fitting import face_sums
+from app.geometry.merging import build_tree
+from app.geometry.tool import Array, Mesh, Region, RegionGraph, Tool, region_letters
+
+ROW_OVERLAP = 0.5  # share of the smaller region's depth that two regions of one row have in common
+
+
+def measure(mesh: Mesh, labels: NDArray[np.int32]) -> Tool:
+    """Build the tool of a segmented mesh.
+
+    Args:
+        mesh: The whole part.
+        labels: (F,) any numbers >= 0 per region, -1 outside the working surface; each region connected.
+
+    Returns:
+        The tool; its regions are renumbered row by row from the rear left, so region i has the i-th letter.
+
+    Raises:
+        InvalidInput: The labels don't fit the mesh or name no region.
+    """
+    if labels.shape != (len(mesh.faces),) or not (labels >= 0).any():
+        raise InvalidInput("The segmentation names no region of this mesh.")
+    inside = labels >= 0
+    compact = np.full(len(labels), -1, np.int32)
+    compact[inside] = np.unique(labels[inside], return_inverse=True)[1].ravel()
+    first = find_attributes(mesh, compact)
+    rank = np.argsort(reading_order(first.low[:, :2], first.high[:, :2]))
+    ordered = np.where(inside, rank[compact], -1).astype(np.int32)
+    attributes = find_attributes(mesh, ordered)
+    graph = _graph(mesh, ordered, attributes)
+    return Tool(mesh, ordered, _regions(attributes), graph)
+
+
+def reading_order(low: Array, high: Array) -> NDArray[np.int64]:
+    """Regions (n,) row by row from the rear (+y), each row from left (-x) to right.
+
+    A row holds every remaining region that overlaps the rearmost one by more than half of the smaller depth.
+    """
+    left = list(range(len(low)))
+    order: list[int] = []
+    while left:
+        lead = max(left, key=lambda i: (round(high[i, 1], 9), -low[i, 0]))
+        row = [i for i in left if i == lead or _overlap(low[i, 1], high[i, 1], low[lead, 1], high[lead, 1]) > ROW_OVERLAP]
+        row.sort(key=lambda i: (round(low[i, 0] + high[i, 0], 9), -high[i, 1], i))
+        order += row
+        left = [i for i in left if i not in row]
+    return np.array(order)
+
+
+def _overlap(a0: float, a1: float, b0: float, b1: float) -> float:
+    """Common part of two intervals / the shorter one."""
+    shorter = min(a1 - a0, b1 - b0)
+    common = min(a1, b1) - max(a0, b0)
+    return common / shorter if shorter > 1e-12 else float(common >= 0)
+
+
+def _graph(mesh: Mesh, labels: NDArray[np.int32], attributes: Attributes) -> RegionGraph:
+    n = len(attributes.area)
+    borders = find_borders(mesh, labels)
+    shared = borders.shared(n)
+    perimeter = borders.perimeter(n)[:, None]
+    neighbour = shared > 0
+    tilt = np.arccos(np.clip(attributes.normal[:, 2], -1, 1))
+    total, plan = attributes.area.sum(), _plan_area(attributes)
+    height, top = attributes.high[:, 2], attributes.high[:, 2].max()
+    depth = top - attributes.low[:, 2].min()
+    return RegionGraph(
+        source="mesh",
+        shared=_divide(shared, perimeter),
+        opposite=_divide(opposite_lengths(mesh, borders, attributes.normal), perimeter),
+        angle=np.where(neighbour, tilt[None, :] - tilt[:, None], 0.0),
+        neighbour=neighbour,
+        corner=corner_neighbours(mesh, labels, shared),
+        first=np.where(neighbour.any(axis=1), neighbour.argmax(axis=1), -1).astype(np.int64),
+        curvature=np.clip(attributes.curvature * np.sqrt(total), -1, 1),
+        height=1 - (top - height) / depth if depth > 1e-9 * np.sqrt(total) else np.ones(n),
+        area=plan / plan.sum(),
+        low=attributes.low[:, :2] / np.sqrt(plan.sum()),
+        high=attributes.high[:, :2] / np.sqrt(plan.sum()),
+    )
+
+
+def _plan_area(attributes: Attributes) -> Array:
+    """Areas seen from above; an upright sheet has none, so its true areas stand in."""
+    return attributes.projected if attributes.projected.sum() > 1e-6 * attributes.area.sum() else attributes.area
+
+
+def _divide(matrix: Array, perimeter: Array) -> Array:
+    """Rows over perimeters; a closed surface that is one region has no border at all."""
+    return np.divide(matrix, perimeter, out=np.zeros_like(matrix), where=perimeter > 0)
+
+
+def _regions(attributes: Attributes) -> tuple[Region, ...]:
+    rows = zip(region_letters(len(attributes.area)), describe(attributes), strict=True)
+    return tuple(
+        Region(
+            name=name,
+            description=description,
+            centroid=attributes.centroid[i],
+            normal=attributes.normal[i],
+            area=float(attributes.area[i]),
+            curvature=float(attributes.curvature[i]),
+            kind=attributes.kind[i],
+        )
+        for i, (name, description) in enumerate(rows)
+    )
+
+
+def warm_up() -> None:
+    """Compile the fitting kernels, or load them from the cache, before somebody waits for them."""
+    vertices = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.1], [1.0, 1.0, 0.0], [0.0, 1.0, 0.2]])
+    build_tree(face_sums(vertices, np.array([[0, 1, 2], [0, 2, 3]])), np.array([[0, 1]]), lambda _: None)
