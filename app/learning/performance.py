@@ -65,7 +65,7 @@ def start_performance(demonstrations: Demonstrations, parameters: PerformancePar
     if not demonstrations:
         raise EmptySample("There is nothing to learn from: record at least one demonstration.")
     if len({d.problem.columns for d in demonstrations}) > 1:
-        raise InvalidInput("The tools of one run need the same features and interactions; sort tools of another kind into their own project.")
+        raise InvalidInput("The tools of one run need the same features and interactions; keep tools of another kind in their own project.")
     for d in demonstrations:
         check_sequence(d.sequence, d.problem.n)
     generator = np.random.default_rng(seed)
@@ -80,7 +80,9 @@ def start_performance(demonstrations: Demonstrations, parameters: PerformancePar
         chosen = diverse_sample(phi, block[keep] / scale, parameters.samples, parameters.zeta) if len(keep) else []
         samples.append(tuple(pool[keep[k]] for k in chosen))
     if not any(samples):
-        raise EmptySample("Every order of these tools has the same features, so no order can be preferred. Demonstrate a tool with more regions.")
+        raise EmptySample(
+            "All orders of these tools have the same features, so none can be preferred. Demonstrate a tool with more regions."
+        )
     first = np.where(live, generator.uniform(parameters.floor, 1.0, len(scale)), 0.0)
     return PerformanceState(
         seed=seed,
@@ -231,7 +233,7 @@ class _Work:
     def questions(self, state: PerformanceState) -> tuple[SimilarityQuestion, ...]:
         """One candidate per cost class below the demonstration, at most K per violated tool, never the same feature sum twice."""
         w, found = state.w, []
-        for i, gap in self.violated(w):
+        for i, _ in self.violated(w):
             d = self.demonstrations[i]
             known = [self.demo[i], *self.taken[i]]
             for candidate in best_classes(d.problem, w / self.scale, self.parameters.classes):

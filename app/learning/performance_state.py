@@ -15,8 +15,8 @@ from app.sequencing.problem import SequencingProblem
 class PerformanceParameters:
     """Hyperparameters of Algorithm 1 and Eq. 7, with two of our own (`floor`, `rounds`).
 
-    Paper: alpha, beta, gamma, lambda, zeta, T, p, K are named there, their values are not. These were chosen on the six synthetic training tools:
-        gamma far above alpha and beta makes the data term an exact penalty, so a demonstration that *can* be the cheapest is.
+    Paper: alpha, beta, gamma, lambda, zeta, T, p, K are named there, their values are not. These were chosen on the six synthetic
+        training tools: gamma far above alpha and beta makes its part an exact penalty, so a demonstration that *can* be the cheapest is.
     """
 
     alpha: float = 0.01

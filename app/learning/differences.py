@@ -1,0 +1,49 @@
+"""How two sequences of one tool differ, in a sentence."""
+
+from collections.abc import Sequence as Ordered
+
+from app.learning.questions import Sequence, differing_regions
+
+EARLY = ("first", "second", "third", "fourth", "fifth")
+
+
+def describe_difference(names: Ordered[str], descriptions: Ordered[str], left: Sequence, right: Sequence) -> str:
+    """'Yours does A (floor) before C (left wall); the other starts with C (left wall).'
+
+    Args:
+        names: Region names by region id.
+        descriptions: Region descriptions by region id; empty where there is none.
+        left: The recorded sequence.
+        right: The other one.
+    """
+    differs = differing_regions(left, right)
+    if not differs:
+        return "Both orders are the same."
+    step = next(k for k in range(len(left)) if left[k] != right[k])
+    ours, theirs = left[step], right[step]
+    called = [_called(names[a], descriptions[a]) for a in range(len(names))]
+    if left == right[::-1]:
+        return f"The other is your order backwards: it starts with {called[theirs]} and ends with {called[right[-1]]}."
+    before = f"Yours does {called[ours]} before {called[theirs]}"
+    if step == 0:
+        after = f"the other starts with {called[theirs]}"
+    elif step < len(EARLY):
+        after = f"the other does {called[theirs]} {EARLY[step]}"
+    else:
+        after = f"the other does {called[theirs]} as step {step + 1}"
+    if len(differs) == 2 and abs(left.index(ours) - left.index(theirs)) == 1:
+        return f"{before}, the other the reverse; all else is the same."
+    end = f" and ends with {called[right[-1]]}" if left[-1] != right[-1] and right[-1] != theirs else ""
+    return f"{before}; {after}{end}. {_moved(len(differs), len(left))}"
+
+
+def _called(name: str, description: str) -> str:
+    words = description.strip()
+    if not words or words.lower() == name.lower():
+        return name
+    keep = len(words) > 1 and words[:2].isupper()
+    return f"{name} ({words if keep else words[0].lower() + words[1:]})"
+
+
+def _moved(differing: int, total: int) -> str:
+    return f"{differing} of {total} regions come at another step."

@@ -1,0 +1,276 @@
+"""Algorithm 2: learn the effort penalty from preferences between equivalent sequences (Eq. 8), in resumable steps.
+
+All sequences in Omega have the demonstration's feature sum, so performance can't tell them apart; where they start and end
+can. Each answer is one row of a small quadratic program. A question is asked only while the answers so far leave both
+replies possible, so few are needed.
+
+Paper:
+    Preferences are compared within a tool (Eq. 4). Printed, Algorithm 2 pools preferred and unpreferred sequences of all tools in one
+        threshold, which is stricter than any expert means.
+    Without an unpreferred sequence eta is 0.
+    Contradicting answers get slack (soft margin), and a smallest set of answers that exclude each other is named.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.optimize import linprog, nnls
+
+from app.errors import EmptySample
+from app.learning.effort_features import EFFORT_COLUMNS, effort_features, effort_penalty
+from app.learning.performance_state import LearningDemonstration
+from app.learning.qp import Array, QuadraticProgram, solve
+from app.learning.questions import PreferenceQuestion, Sequence, differing_regions, fingerprint
+from app.sequencing.classes import equivalent_sequences
+
+__all__ = ["EFFORT_WORDS", "EffortParameters", "EffortState", "EffortStepResult", "effort_penalty", "effort_step", "start_effort"]
+
+SAME = 1e-9  # places this close are the same
+UNDECIDED = 1e-3  # a pair this far (as a share) outside the cone of known answers is open
+
+Demonstrations = list[LearningDemonstration]
+Answers = Mapping[str, str]  # fingerprint -> "left" | "right" | "equal" | "cant_tell"
+
+
+@dataclass(frozen=True)
+class EffortParameters:
+    """Hyperparameters of Eq. 8."""
+
+    margin: float = 0.1  # epsilon: how much less effort the preferred sequence has
+    regularisation: float = 0.05  # lambda
+    batch: int = 2  # questions asked at a time
+    most: int = 12  # questions asked at all
+    cap: int = 256  # equivalent sequences looked at per tool
+
+
+EFFORT_WORDS: dict[str, tuple[str, str]] = {
+    "margin": ("ε", "Margin between preferred and not"),
+    "regularisation": ("λ", "Keep weights small"),
+    "batch": ("B", "Questions asked at a time"),
+    "most": ("Q", "Questions asked at most"),
+    "cap": ("|Ω|", "Equivalent orders looked at per tool"),
+}
+
+
+@dataclass(frozen=True)
+class EffortState:
+    """An effort run between two steps."""
+
+    seed: int
+    weights: tuple[float, ...]  # performance weights the run builds on, (n + m,)
+    choices: tuple[tuple[Sequence, ...], ...]  # per demonstration: equivalent sequences, one per distinct z, the demonstrated one first
+    complete: bool  # every equivalent sequence of every tool was looked at
+    asked: tuple[PreferenceQuestion, ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain JSON values; floats survive bit for bit."""
+        return {
+            "seed": self.seed,
+            "weights": list(self.weights),
+            "choices": [[list(s) for s in own] for own in self.choices],
+            "complete": self.complete,
+            "asked": [{k: list(v) if isinstance(v, tuple) else v for k, v in vars(q).items()} for q in self.asked],
+        }
+
+    @staticmethod
+    def from_json(value: dict[str, Any]) -> "EffortState":
+        asked = tuple(_question_from(q) for q in value["asked"])
+        choices = tuple(tuple(tuple(s) for s in own) for own in value["choices"])
+        return EffortState(value["seed"], tuple(value["weights"]), choices, value["complete"], asked)
+
+
+def _question_from(value: dict[str, Any]) -> PreferenceQuestion:
+    return PreferenceQuestion(**{k: tuple(v) if isinstance(v, list) else v for k, v in value.items()})
+
+
+@dataclass(frozen=True)
+class EffortStepResult:
+    """What an effort step hands back."""
+
+    state: EffortState
+    outcome: str  # "questions" | "converged" | "infeasible"
+    questions: tuple[PreferenceQuestion, ...]  # those without an answer
+    effort_weights: Array  # (8,) >= 0; of contradicting answers the soft-margin compromise
+    message: str
+    conflicts: tuple[str, ...] = ()  # fingerprints of a smallest set of answers that exclude each other
+
+
+def start_effort(demonstrations: Demonstrations, weights: Array, parameters: EffortParameters, seed: int) -> EffortState:
+    """Find the equivalent sequences of each demonstration (Omega, Eq. 3) that start or end elsewhere."""
+    if not demonstrations:
+        raise EmptySample("There is nothing to learn from: record at least one demonstration.")
+    choices, complete = [], True
+    for d in demonstrations:
+        omega = equivalent_sequences(d.problem, d.sequence, parameters.cap)
+        complete = complete and omega.complete
+        own: list[Sequence] = [tuple(d.sequence)]
+        places = [effort_features(d.problem, d.sequence)]
+        for candidate in omega.sequences:
+            z = effort_features(d.problem, candidate)
+            if all(np.abs(z - known).max() > SAME for known in places):
+                own.append(candidate)
+                places.append(z)
+        choices.append(tuple(own))
+    return EffortState(seed, tuple(float(x) for x in weights), tuple(choices), complete)
+
+
+def effort_step(demonstrations: Demonstrations, parameters: EffortParameters, state: EffortState, answers: Answers) -> EffortStepResult:
+    """Fit the answers so far and ask what they leave open; pure and deterministic.
+
+    Args:
+        demonstrations: The ones the run was started with, in the same order.
+        parameters: Hyperparameters.
+        state: As the last step returned it.
+        answers: All answers of the run so far by fingerprint.
+
+    Returns:
+        New state, questions or effort weights, and the answers that contradict each other.
+    """
+    known = [_Answered.of(demonstrations, q, answers[q.fingerprint]) for q in state.asked if q.fingerprint in answers]
+    weights = _fit(known, parameters)
+    unanswered = tuple(q for q in state.asked if q.fingerprint not in answers)
+    if unanswered:
+        return EffortStepResult(state, "questions", unanswered, weights, f"Waiting for {_count(len(unanswered), 'answer')}.")
+    conflicts = _smallest_conflict(known)
+    if conflicts:
+        text = f"{_count(len(conflicts), 'answer')} exclude each other; the weights are a compromise. Change one of them to go on."
+        return EffortStepResult(state, "infeasible", (), weights, text, conflicts)
+    fresh = _next_questions(demonstrations, parameters, state, known)
+    if fresh:
+        state = replace(state, asked=state.asked + fresh)
+        return EffortStepResult(state, "questions", fresh, weights, f"{_count(len(fresh), 'question')} about equally good orders.")
+    return EffortStepResult(state, "converged", (), weights, _closing(state, known))
+
+
+@dataclass(frozen=True)
+class _Answered:
+    """One answer as a row: z of the right sequence minus z of the left one."""
+
+    fingerprint: str
+    difference: Array  # (8,)
+    value: str
+
+    @staticmethod
+    def of(demonstrations: Demonstrations, question: PreferenceQuestion, value: str) -> "_Answered":
+        problem = demonstrations[question.demonstration].problem
+        return _Answered(question.fingerprint, effort_features(problem, question.right) - effort_features(problem, question.left), value)
+
+    @property
+    def towards(self) -> Array | None:
+        """Direction d with w_z . d >= margin, if the answer prefers a side."""
+        return {"left": self.difference, "right": -self.difference}.get(self.value)
+
+
+def _fit(known: list[_Answered], parameters: EffortParameters) -> Array:
+    """Soft-margin weights (Eq. 8): min lambda/2 |w|^2 + sum slack, w >= 0."""
+    wide = len(EFFORT_COLUMNS)
+    strict = [a.towards for a in known if a.towards is not None]
+    if not strict:
+        return np.zeros(wide)
+    level = [sign * a.difference for a in known if a.value == "equal" for sign in (1.0, -1.0)]
+    m = len(strict) + len(level)
+    rows = np.zeros((2 * m + wide, wide + m))
+    rows[:m, :wide] = np.array([-d for d in strict] + level)
+    rows[:m, wide:] = -np.eye(m)
+    rows[m : 2 * m, wide:] = -np.eye(m)
+    rows[2 * m :, :wide] = -np.eye(wide)
+    limits = np.r_[np.full(len(strict), -parameters.margin), np.full(len(level), parameters.margin / 2), np.zeros(m + wide)]
+    curvature = np.r_[np.full(wide, parameters.regularisation), np.zeros(m)]
+    program = QuadraticProgram(curvature, np.r_[np.zeros(wide), np.ones(m)], rows, limits)
+    return np.maximum(solve(program)[:wide], 0.0)
+
+
+def _possible(known: list[_Answered]) -> bool:
+    """Whether some w_z >= 0 agrees with all answers: preferred strictly less effort, 'equal' exactly equal."""
+    strict = [a.towards for a in known if a.towards is not None]
+    if not strict:
+        return True
+    level = [a.difference for a in known if a.value == "equal"]
+    wide = len(EFFORT_COLUMNS)
+    result = linprog(
+        np.zeros(wide),
+        A_ub=-np.array(strict),
+        b_ub=-np.ones(len(strict)),
+        A_eq=np.array(level) if level else None,
+        b_eq=np.zeros(len(level)) if level else None,
+        bounds=(0, None),
+        method="highs",
+    )
+    return bool(result.status == 0)
+
+
+def _smallest_conflict(known: list[_Answered]) -> tuple[str, ...]:
+    """A set of answers that can't all hold, none of which can be left out (deletion filter); empty if all agree."""
+    if _possible(known):
+        return ()
+    kept = list(known)
+    for answer in known:
+        rest = [a for a in kept if a is not answer]
+        if not _possible(rest):
+            kept = rest
+    return tuple(a.fingerprint for a in kept)
+
+
+def _next_questions(
+    demonstrations: Demonstrations, parameters: EffortParameters, state: EffortState, known: list[_Answered]
+) -> tuple[PreferenceQuestion, ...]:
+    """The pairs (demonstrated, equivalent) farthest from being implied by the answers so far, at most one per direction."""
+    room = min(parameters.batch, parameters.most - len(state.asked))
+    cone = _cone(known)
+    seen = [a.difference for a in known]
+    found: list[PreferenceQuestion] = []
+    while len(found) < room:
+        best: tuple[float, int, Sequence, Array] | None = None
+        for i, d in enumerate(demonstrations):
+            own = effort_features(d.problem, state.choices[i][0])
+            for candidate in state.choices[i][1:]:
+                difference = effort_features(d.problem, candidate) - own
+                open_by = min(_outside(cone, difference), _outside(cone, -difference))
+                if any(_parallel(difference, s) for s in seen) or open_by < UNDECIDED:
+                    continue
+                worth = open_by * float(np.linalg.norm(difference))
+                if best is None or worth > best[0] + SAME:
+                    best = (worth, i, candidate, difference)
+        if best is None:
+            break
+        _, i, candidate, difference = best
+        seen.append(difference)
+        found.append(_question(i, state.choices[i][0], candidate))
+    return tuple(found)
+
+
+def _cone(known: list[_Answered]) -> Array:
+    """(8, k) columns whose non-negative combinations are the differences already decided in favour of 'left'."""
+    rows = [a.towards for a in known if a.towards is not None]
+    rows += [sign * a.difference for a in known if a.value == "equal" for sign in (1.0, -1.0)]
+    return np.array([*rows, *np.eye(len(EFFORT_COLUMNS))]).T
+
+
+def _outside(cone: Array, difference: Array) -> float:
+    """Distance of a direction from the cone, as a share of its length."""
+    return float(nnls(cone, difference / np.linalg.norm(difference))[1])
+
+
+def _parallel(a: Array, b: Array) -> bool:
+    return abs(float(a @ b)) > (1 - SAME) * float(np.linalg.norm(a) * np.linalg.norm(b))
+
+
+def _question(i: int, left: Sequence, right: Sequence) -> PreferenceQuestion:
+    where = [text for text, a, b in (("starts", left[0], right[0]), ("ends", left[-1], right[-1])) if a != b]
+    why = f"Both orders are equally good; the other one {' and '.join(where)} elsewhere."
+    return PreferenceQuestion(i, left, right, why, differing_regions(left, right), fingerprint("preference", i, left, right))
+
+
+def _closing(state: EffortState, known: list[_Answered]) -> str:
+    if all(len(own) == 1 for own in state.choices):
+        return "No recorded order has an equally good one that starts or ends elsewhere: there is no effort to learn."
+    if not any(a.value in ("left", "right") for a in known):
+        return "No order was preferred to another, so effort does not count."
+    note = "" if state.complete else " Some tools have more equally good orders than were looked at."
+    return f"{_count(len(known), 'answer')} settle which start and end is less effort.{note}"
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

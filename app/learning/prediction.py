@@ -1,0 +1,52 @@
+"""The order a policy chooses for a tool, with its reasons."""
+
+from dataclasses import dataclass
+
+from app.learning.effort_features import effort_penalty
+from app.learning.policy import Policy
+from app.learning.qp import Array
+from app.sequencing.features import Feature
+from app.sequencing.problem import SequencingProblem
+from app.sequencing.shortest import shortest_sequence
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """The cheapest sequence of a tool under a policy."""
+
+    sequence: tuple[int, ...]
+    cost: float
+    ties: int  # sequences of this cost, this one included
+    proved: bool  # no sequence is cheaper, for certain
+    method: str
+    effort: float | None  # eta of the sequence, None when effort was not learned
+    step_parts: Array  # (N, n + m) w * phi of each step; adds up to the cost
+    labels: tuple[Feature, ...]  # (n + m)
+    tie_settled_by: str | None  # plain words, None without ties
+
+
+def predict(problem: SequencingProblem, policy: Policy) -> Prediction:
+    """The lowest-cost sequence; among equally cheap ones the one of least effort (Eq. 8), then the lowest region ids.
+
+    Raises:
+        StalePolicy: The policy belongs to another feature set, version or interactions.
+    """
+    policy.check(problem)
+    effort = policy.effort_weights
+    breaks = effort is not None and bool((effort != 0).any())
+    tie_break = (lambda s: effort_penalty(problem, effort, s)) if effort is not None and breaks else None
+    best = shortest_sequence(problem, policy.weights, tie_break)
+    settled = None
+    if best.ties > 1:
+        settled = "least effort at start and end" if breaks else "region names: no effort was learned"
+    return Prediction(
+        sequence=best.sequence,
+        cost=best.cost,
+        ties=best.ties,
+        proved=best.proved,
+        method=best.method,
+        effort=None if effort is None else effort_penalty(problem, effort, best.sequence),
+        step_parts=problem.step_features(best.sequence) * policy.weights,
+        labels=problem.columns,
+        tie_settled_by=settled,
+    )
