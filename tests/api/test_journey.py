@@ -1,0 +1,149 @@
+"""A project from the first look to the robot, by REST alone."""
+
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+
+from tests.api.problems import check_problem
+from tests.conftest import Api
+
+SETTLED = ("waiting_for_expert", "converged", "stalled", "infeasible", "failed", "cancelled")
+
+
+@pytest.fixture
+def sample(api: Api) -> dict[str, Any]:
+    return api.post("/projects/sample")
+
+
+def teach(api: Api, run: dict[str, Any], value: str) -> dict[str, Any]:
+    """Answer everything a run asks until it has a policy."""
+    for _ in range(60):
+        run = api.until(f"/runs/{run['id']}", lambda row: row["state"] in SETTLED, seconds=120)
+        if run["state"] == "stalled":
+            return api.post(f"/runs/{run['id']}/finish", status=202)
+        if run["state"] != "waiting_for_expert":
+            return run
+        for query in api.get(f"/runs/{run['id']}/queries", params={"state": "open"})["items"]:
+            api.post(f"/queries/{query['id']}/answer", {"value": value})
+    raise AssertionError(f"still asking: {run}")
+
+
+def test_the_sample_project_has_something_to_do_at_every_stage(api: Api, sample: dict[str, Any]) -> None:
+    """Six tools to train on, four to predict; five are demonstrated."""
+    assert sample["sample"] is True
+    assert [stage["key"] for stage in sample["stages"]] == ["tools", "demonstrations", "coverage", "teach", "policy", "robot"]
+    tools = api.get(f"/projects/{sample['id']}/tools")["items"]
+    assert len(tools) >= 10
+    assert sample["counts"]["tools"] == len(tools)
+    assert [t["split"] for t in tools].count("train") == 6
+    assert [t["split"] for t in tools].count("test") == 4
+    assert sum(t["demonstrated"] for t in tools) == 5
+    assert {t["state"] for t in tools} == {"ready"}
+    coverage = api.get(f"/projects/{sample['id']}/coverage")
+    assert coverage["rho"] == pytest.approx(coverage["captured"] / coverage["possible"])
+    assert coverage["demonstrations"] == 5
+    assert all(len(table["cells"]) == 3 and all(len(row) == 3 for row in table["cells"]) for table in coverage["tables"])
+
+
+def test_recording(client: TestClient, api: Api, sample: dict[str, Any]) -> None:
+    """Pick, undo, redo, reorder, clear, save; a second save supersedes the first."""
+    tool = next(t for t in api.get(f"/projects/{sample['id']}/tools")["items"] if not t["demonstrated"] and t["split"] == "train")
+    draft = f"/tools/{tool['id']}/draft"
+    regions = [row["id"] for row in api.get(f"/tools/{tool['id']}/regions")["items"]]
+    assert regions == list(range(tool["region_count"]))
+    assert api.get(draft)["sequence"] == []
+    for region in (2, 0, 1):
+        state = api.post(f"{draft}/pick", {"region": region}, status=200)
+    assert state["sequence"] == [2, 0, 1]
+    assert (state["can_undo"], state["can_redo"], state["complete"]) == (True, False, False)
+    assert len(state["click_times"]) == 3
+    assert state["click_times"][0] == 0
+    assert api.post(f"{draft}/undo", status=200)["sequence"] == [2, 0]
+    assert api.post(f"{draft}/redo", status=200)["sequence"] == [2, 0, 1]
+    check_problem(client.post(f"/api/v1{draft}/pick", json={"region": 2}), 422, "IncompleteSequence")
+    check_problem(client.post(f"/api/v1{draft}/save", json={}), 422, "IncompleteSequence")
+    assert api.post(f"{draft}/clear", status=200)["sequence"] == []
+    order = regions[::-1]
+    state = api.call("PUT", draft, 200, json={"sequence": order})
+    assert (state["sequence"], state["complete"]) == (order, True)
+    first = api.post(f"{draft}/save", {"name": "First"})
+    assert (first["name"], first["sequence"], first["source"]) == ("First", order, "recorded")
+    assert api.get(f"/tools/{tool['id']}")["demonstration_id"] == first["id"]
+
+    second = api.post(f"/tools/{tool['id']}/demonstrations", {"sequence": regions, "name": "Second", "author": "Kim"})
+    assert (second["source"], second["author"]) == ("rest", "Kim")
+    assert api.get(f"/demonstrations/{first['id']}")["superseded_by"] == second["id"]
+    address = f"/demonstrations/{second['id']}"
+    renamed = api.call("PATCH", address, 200, json={"name": "Other"}, headers={"If-Match": f'"{second["version"]}"'})
+    assert renamed["name"] == "Other"
+    api.delete(address, renamed["version"])
+    assert api.get(f"/tools/{tool['id']}")["demonstration_id"] != second["id"]
+    assert api.post(f"{address}/restore", status=200)["deleted"] is False
+
+
+def test_interactions_change_coverage(client: TestClient, api: Api, sample: dict[str, Any]) -> None:
+    choices = sample["interaction_choices"]
+    only = {"first": choices[0]["first"], "second": choices[0]["second"]}
+    changed = api.call("PUT", f"/projects/{sample['id']}/interactions", 200, json={"interactions": [only]})
+    assert [(i["first"], i["second"]) for i in changed["interactions"]] == [(only["first"], only["second"])]
+    tables = api.get(f"/projects/{sample['id']}/coverage")["tables"]
+    assert [(t["first"], t["second"]) for t in tables] == [(only["first"], only["second"])]
+    wrong = {"interactions": [{"first": "height", "second": "colour"}]}
+    assert "colour" in check_problem(client.put(f"/api/v1/projects/{sample['id']}/interactions", json=wrong), 422, "UnknownFeature")
+
+
+def test_teaching_to_the_robot(api: Api, sample: dict[str, Any]) -> None:
+    """Performance run, effort run, plan for an undemonstrated tool, playback of the arm on it."""
+    project = sample["id"]
+    defaults = api.get(f"/projects/{project}/run-defaults", params={"kind": "performance"})["parameters"]
+    assert all(p["symbol"] and p["label"] for p in defaults)
+    run = api.post(f"/projects/{project}/runs", {"kind": "performance", "seed": 3}, status=202)
+    run = teach(api, run, "not_similar")
+    run = api.until(f"/runs/{run['id']}", lambda row: row["policy_id"] is not None)
+    metrics = api.get(f"/runs/{run['id']}/metrics")["items"]
+    assert [m["iteration"] for m in metrics] == sorted(m["iteration"] for m in metrics)
+    assert metrics[-1]["iteration"] == run["iteration"]
+    later = api.get(f"/runs/{run['id']}/metrics", params={"after": metrics[9]["iteration"]})["items"]
+    assert later == metrics[10:]
+
+    effort = teach(api, api.post(f"/projects/{project}/runs", {"kind": "effort", "seed": 3}, status=202), "left")
+    effort = api.until(f"/runs/{effort['id']}", lambda row: row["state"] in ("converged", "infeasible", "failed"))
+    assert effort["state"] == "converged", effort
+
+    tool = next(t for t in api.get(f"/projects/{project}/tools")["items"] if t["split"] == "test")
+    policy = api.get(f"/policies/{effort['policy_id'] or run['policy_id']}")
+    assert {p["id"] for p in api.get(f"/projects/{project}/policies")["items"]} >= {run["policy_id"]}
+    plan = api.post(f"/policies/{policy['id']}/plans", {"tool_id": tool["id"]})
+    assert sorted(plan["sequence"]) == list(range(tool["region_count"]))
+    assert plan["proved"] is True
+    assert sum(step["total"] for step in plan["steps"]) == pytest.approx(plan["cost"])
+    for step in plan["steps"]:
+        assert sum(step["parts"]) == pytest.approx(step["total"])
+    other = api.post(f"/plans/{plan['id']}/what-if", {"sequence": plan["sequence"][::-1]}, status=200)
+    assert other["cost"] >= plan["cost"] - 1e-9
+    assert other["delta"] == pytest.approx(other["cost"] - plan["cost"])
+    assert api.get(f"/policies/{policy['id']}/plans")["items"][0]["id"] == plan["id"]
+
+    playback = api.post(f"/plans/{plan['id']}/playbacks", {}, status=202)
+    playback = api.until(f"/playbacks/{playback['id']}", lambda row: row["state"] in ("ready", "failed"), seconds=200)
+    assert playback["state"] == "ready", playback
+    assert [row["region"] for row in sorted(playback["regions"], key=lambda row: row["step"])] == plan["sequence"]
+    assert playback["cycle_s"] == pytest.approx(playback["series"]["t"][-1], rel=0.1)
+    assert 0 < playback["covered"] <= 1
+
+
+def test_undo_of_an_answer_asks_again(api: Api, sample: dict[str, Any]) -> None:
+    run = api.post(f"/projects/{sample['id']}/runs", {"kind": "performance", "seed": 7}, status=202)
+    run = api.until(f"/runs/{run['id']}", lambda row: row["state"] in SETTLED)
+    queries = api.get(f"/projects/{sample['id']}/queries", params={"state": "open"})["items"]
+    assert len(queries) == run["open_queries"] >= 1
+    query = queries[0]
+    assert [c["value"] for c in query["choices"]] == ["similar", "not_similar", "cant_tell"]
+    assert sorted(query["left"]["sequence"]) == sorted(query["right"]["sequence"])
+    if len(queries) > 1:
+        answer = api.post(f"/queries/{query['id']}/answer", {"value": "similar"})
+        assert answer["run_state"] == "waiting_for_expert"
+        assert api.get(f"/queries/{query['id']}")["answer"]["value"] == "similar"
+        reopened = api.post(f"/answers/{answer['id']}/undo", status=200)
+        assert (reopened["state"], reopened["answer"]) == ("open", None)

@@ -1,0 +1,73 @@
+"""Learners never wait for a person: the power goes while a question is open, and nothing is lost."""
+
+from typing import Any
+
+from tests.conftest import Api, LiveServer
+
+SETTLED = ("waiting_for_expert", "converged", "stalled", "infeasible", "failed")
+SEED = 11
+
+
+def settled(api: Api, run: dict[str, Any]) -> dict[str, Any]:
+    return api.until(f"/runs/{run['id']}", lambda row: row["state"] in SETTLED, seconds=120)
+
+
+def start(api: Api) -> dict[str, Any]:
+    project = api.post("/projects/sample")["id"]
+    return api.post(f"/projects/{project}/runs", {"kind": "performance", "seed": SEED}, status=202)
+
+
+def questions(api: Api, run: dict[str, Any]) -> list[dict[str, Any]]:
+    return api.get(f"/runs/{run['id']}/queries", params={"state": "open"})["items"]
+
+
+def answer_of(query: dict[str, Any]) -> str:
+    """A fixed opinion about two sequences, the same in every project."""
+    return "similar" if query["left"]["sequence"][-1] == query["right"]["sequence"][-1] else "not_similar"
+
+
+def finish(api: Api, run: dict[str, Any], log: list[Any]) -> list[float]:
+    """Answer to the end; the policy's weights. `log` gets everything that was asked."""
+    for _ in range(60):
+        run = settled(api, run)
+        if run["state"] == "stalled":
+            api.post(f"/runs/{run['id']}/finish", status=202)
+            run = api.until(f"/runs/{run['id']}", lambda row: row["policy_id"] is not None)
+        if run["state"] != "waiting_for_expert":
+            assert run["policy_id"] is not None, run
+            return [weight["value"] for weight in api.get(f"/policies/{run['policy_id']}")["weights"]]
+        for query in questions(api, run):
+            log.append((query["tool_name"], query["left"]["sequence"], query["right"]["sequence"]))
+            api.post(f"/queries/{query['id']}/answer", {"value": answer_of(query)})
+    raise AssertionError("the run asks for ever")
+
+
+def test_a_killed_server_goes_on_at_the_same_question(live_server: LiveServer, live_api: Api) -> None:
+    """SIGKILL with answers given and a query open; after the restart the same query is open and the weights are bit-equal."""
+    undisturbed: list[Any] = []
+    expected = finish(live_api, start(live_api), undisturbed)
+    assert undisturbed, "the run must ask something for this test to mean anything"
+
+    run = settled(live_api, start(live_api))
+    assert run["state"] == "waiting_for_expert"
+    asked = questions(live_api, run)
+    log: list[Any] = []
+    if len(asked) > 1:
+        first = asked[0]
+        log.append((first["tool_name"], first["left"]["sequence"], first["right"]["sequence"]))
+        live_api.post(f"/queries/{first['id']}/answer", {"value": answer_of(first)})
+    still_open = [query["id"] for query in questions(live_api, run)]
+    live_server.kill()
+    live_server.start()
+    assert [query["id"] for query in questions(live_api, run)] == still_open
+    assert finish(live_api, run, log) == expected
+    assert log == undisturbed
+
+
+def test_a_server_killed_while_training_takes_the_run_up_again(live_server: LiveServer, live_api: Api) -> None:
+    """The job dies with the process; the restarted server runs it from its checkpoint to the same weights."""
+    expected = finish(live_api, start(live_api), [])
+    run = start(live_api)
+    live_server.kill()
+    live_server.start()
+    assert finish(live_api, run, []) == expected
