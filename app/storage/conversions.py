@@ -1,0 +1,103 @@
+"""Core values to bytes and back: NumPy archives with one JSON entry for the words."""
+
+import io
+import json
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from app.geometry.importing import CleaningReport, ImportedPart
+from app.geometry.tool import Mesh, Region, RegionGraph, Tool
+from app.robot.playback import Playback, RegionReport
+
+MEDIA_TYPE = "application/x-npz"
+GRAPH_ARRAYS = tuple(f.name for f in fields(RegionGraph) if f.name != "source")
+REGION_WORDS = ("name", "description", "kind")
+REGION_NUMBERS = ("area", "curvature")
+PLAYBACK_ARRAYS = ("times", "positions", "orientations", "joint_angles", "force_n", "off_path_mm", "region_at")
+
+
+def pack(words: Any, **arrays: np.ndarray) -> bytes:
+    """An .npz; the same values give the same bytes."""
+    file = io.BytesIO()
+    text = np.frombuffer(json.dumps(words).encode(), np.uint8)
+    np.savez_compressed(file, words=text, **arrays)
+    return file.getvalue()
+
+
+def unpack(content: bytes) -> tuple[Any, dict[str, np.ndarray]]:
+    """What `pack` was given; never runs code from the file."""
+    with np.load(io.BytesIO(content), allow_pickle=False) as archive:
+        arrays = {name: archive[name] for name in archive.files}
+    return json.loads(arrays.pop("words").tobytes()), arrays
+
+
+def tool_to_bytes(tool: Tool) -> bytes:
+    """A tool as an .npz."""
+    words = {
+        "source": tool.graph.source,
+        "regions": [{k: getattr(r, k) for k in (*REGION_WORDS, *REGION_NUMBERS)} for r in tool.regions],
+    }
+    return pack(
+        words,
+        vertices=tool.mesh.vertices,
+        faces=tool.mesh.faces,
+        labels=tool.labels,
+        centroids=np.array([r.centroid for r in tool.regions]).reshape(-1, 3),
+        normals=np.array([r.normal for r in tool.regions]).reshape(-1, 3),
+        **{f"graph_{name}": getattr(tool.graph, name) for name in GRAPH_ARRAYS},
+    )
+
+
+def tool_from_bytes(content: bytes) -> Tool:
+    """The tool that `tool_to_bytes` stored, bit for bit."""
+    words, a = unpack(content)
+    regions = tuple(
+        Region(centroid=c, normal=n, **about) for about, c, n in zip(words["regions"], a["centroids"], a["normals"], strict=True)
+    )
+    graph = RegionGraph(source=words["source"], **{name: a[f"graph_{name}"] for name in GRAPH_ARRAYS})
+    return Tool(Mesh(a["vertices"], a["faces"]), a["labels"], regions, graph)
+
+
+def part_to_bytes(part: ImportedPart) -> bytes:
+    """A cleaned part before segmentation as an .npz."""
+    lines = [list(line) for line in part.report.lines]
+    return pack({"lines": lines}, vertices=part.mesh.vertices, faces=part.mesh.faces, cad_face=part.cad_face)
+
+
+def part_from_bytes(content: bytes) -> ImportedPart:
+    """The part that `part_to_bytes` stored."""
+    words, a = unpack(content)
+    report = CleaningReport(tuple((level, text) for level, text in words["lines"]))
+    return ImportedPart(Mesh(a["vertices"], a["faces"]), a["cad_face"], report)
+
+
+def playback_to_bytes(playback: Playback) -> bytes:
+    """A robot playback as an .npz."""
+    reports = [{f.name: getattr(r, f.name) for f in fields(RegionReport)} for r in playback.region_reports]
+    words = {
+        "bodies": list(playback.bodies),
+        "reports": reports,
+        "cycle_s": float(playback.cycle_s),
+        "in_contact_share": float(playback.in_contact_share),
+    }
+    meshes: dict[str, np.ndarray] = {}
+    for i, (vertices, faces) in enumerate(playback.body_meshes):
+        meshes[f"vertices_{i}"], meshes[f"faces_{i}"] = np.asarray(vertices), np.asarray(faces)
+    return pack(words, **meshes, **{name: np.asarray(getattr(playback, name)) for name in PLAYBACK_ARRAYS})
+
+
+def playback_from_bytes(content: bytes) -> Playback:
+    """The playback that `playback_to_bytes` stored."""
+    words, a = unpack(content)
+    reports = tuple(RegionReport(**{**r, "problems": tuple(tuple(p) for p in r["problems"])}) for r in words["reports"])
+    meshes = tuple((a[f"vertices_{i}"], a[f"faces_{i}"]) for i in range(len(words["bodies"])))
+    return Playback(
+        bodies=tuple(words["bodies"]),
+        body_meshes=meshes,
+        region_reports=reports,
+        cycle_s=words["cycle_s"],
+        in_contact_share=words["in_contact_share"],
+        **{name: a[name] for name in PLAYBACK_ARRAYS},
+    )
