@@ -1,0 +1,226 @@
+// The lowest-cost order for any tool: the proof, the ties, what every step costs and why, and "what if" by moving a region.
+
+import { all, get, post } from "../api.js";
+import { stackedBars } from "../charts.js";
+import { fill, h, skeleton } from "../dom.js";
+import { gathered, listen } from "../events.js";
+import { icon } from "../icons.js";
+import { sequenceStyle } from "../ramp.js";
+import { boot, pageAddress, query, remember, showFault } from "../shell.js";
+import { Stepper } from "../stepper.js";
+import { complain } from "../toasts.js";
+import { View3D } from "../view3d.js";
+import { number, plural, sentence } from "../words.js";
+
+const CAUSES = 5; // named in the chart; the rest is one grey bar
+
+const shell = await boot();
+const parts = {
+  head: h("div.head"),
+  stage: h("section.stage", { "aria-label": "3D view" }),
+  proof: h("div.proof"),
+  facts: h("dl.facts"),
+  whatif: h("div.whatif", { "aria-live": "polite" }),
+  legend: h("div.legend"),
+  chart: h("div.chart"),
+  tiles: h("div.tiles", { role: "group", "aria-label": "Order; move a region with Alt and the arrows to see what it would cost" }),
+  weights: h("dialog.card.pad.keys.weights"),
+};
+const state = { policies: [], policy: null, tools: [], tool: null, plan: null, order: [], whatif: null, view: null, stepper: null, chart: null };
+
+// ---- chart --------------------------------------------------------------------------------------------------------------------
+
+function causes() {
+  const { features, steps } = state.plan;
+  const size = features.map((_, k) => steps.reduce((sum, step) => sum + Math.abs(step.parts[k]), 0));
+  const ranked = size.map((value, k) => [value, k]).filter(([value]) => value > 1e-9).sort((a, b) => b[0] - a[0]).map(([, k]) => k);
+  const named = ranked.slice(0, ranked.length === CAUSES + 1 ? CAUSES + 1 : CAUSES);
+  const rest = ranked.slice(named.length);
+  const keys = named.map((k, i) => ({ columns: [k], label: features[k].label, symbol: features[k].symbol, colour: i < CAUSES ? `var(--c-${i + 1})` : "var(--c-rest)" }));
+  if (rest.length) keys.push({ columns: rest, label: plural(rest.length, "other"), symbol: rest.map((k) => features[k].symbol).join(", "), colour: "var(--c-rest)" });
+  return keys;
+}
+
+function paintChart() {
+  const keys = causes();
+  const columns = state.plan.steps.map((step, i) => ({ title: `Step ${i + 1}, ${step.name}`, parts: keys.map((key) => key.columns.reduce((sum, k) => sum + step.parts[k], 0)) }));
+  state.chart = stackedBars(parts.chart, { keys, columns, description: `Cost per step of the order for ${state.tool.name}` });
+  fill(parts.legend, keys.map((key, k) => h("button", { type: "button", dataset: { key: `cause-${k}`, tip: `${key.label} (${key.symbol})` }, onpointerenter: () => state.chart.only(k), onpointerleave: () => state.chart.only(null), onfocus: () => state.chart.only(k), onblur: () => state.chart.only(null) },
+    h("span.swatch", { style: { "--swatch": key.colour } }), key.label)));
+}
+
+// ---- what if --------------------------------------------------------------------------------------------------------------------
+
+const changed = () => state.order.some((region, i) => region !== state.plan.sequence[i]);
+
+async function move(from, to) {
+  if (to < 0 || to >= state.order.length || from === to) return;
+  const order = [...state.order];
+  order.splice(to, 0, ...order.splice(from, 1));
+  state.order = order;
+  state.whatif = null;
+  paintOrder();
+  parts.tiles.children[to]?.focus();
+  if (changed()) {
+    const answer = await post(`/plans/${state.plan.id}/what-if`, { sequence: order });
+    if (state.order === order) state.whatif = answer;
+  }
+  paintWhatIf();
+}
+
+function paintWhatIf() {
+  if (!changed()) return fill(parts.whatif, h("h3", {}, "What if?"), h("p.muted", {}, "Move a region below to another place and see what it would cost."));
+  if (!state.whatif) return fill(parts.whatif, h("h3", {}, "Your change"), skeleton(2, ".9rem"));
+  const { delta, features } = state.whatif;
+  const signed = (value) => `${value < 0 ? "−" : "+"}${number(Math.abs(value))}`;
+  const most = [...features].filter((entry) => Math.abs(entry.delta) > 1e-9).sort((a, b) => Math.abs(b.delta) - Math.abs(a.delta)).slice(0, 3);
+  const verdict = Math.abs(delta) <= 1e-7 * Math.max(1, Math.abs(state.plan.cost)) ? "equally cheap" : signed(delta);
+  return fill(parts.whatif, h("h3", {}, "Your change", h("span.num", {}, verdict)),
+    h("div.pay", {}, most.map((entry) => [h("span.swatch", { style: { "--swatch": entry.delta > 0 ? "var(--bad)" : "var(--ok)" } }), h("span", {}, entry.label), h("span.num", {}, signed(entry.delta))])),
+    h("button.btn.small", { type: "button", style: { "margin-top": "var(--s-2)" }, onclick: back }, "Back to the cheapest order"));
+}
+
+function back() {
+  state.order = [...state.plan.sequence];
+  state.whatif = null;
+  paintOrder();
+  paintWhatIf();
+}
+
+function tile(region, i) {
+  const step = state.plan.steps.find((entry) => entry.region === region);
+  return h("button.tile", { type: "button", draggable: "true", style: sequenceStyle(i, state.order.length), dataset: { key: `tile-${region}`, tip: `Step ${i + 1}: ${step.name}. Alt with arrows moves it.` } }, h("span.seq-no", {}, i + 1), step.name);
+}
+
+function paintOrder() {
+  fill(parts.tiles, state.order.map(tile));
+  showOrder(state.stepper.step);
+}
+
+function showOrder(step) {
+  const { tool, order } = state;
+  state.view.show({ mode: "sequence", tool_id: tool.id, sequence: order, step: step < order.length ? step : null }, `${tool.name}, order after step ${step} of ${order.length}`);
+}
+
+function movable() {
+  let lifted = -1;
+  const place = (event) => [...parts.tiles.children].indexOf(event.target.closest(".tile"));
+  parts.tiles.addEventListener("keydown", (event) => {
+    const by = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+    if (!by || !event.altKey) return;
+    event.preventDefault();
+    event.stopPropagation();
+    move(place(event), place(event) + by).catch(complain);
+  });
+  parts.tiles.addEventListener("dragstart", (event) => { lifted = place(event); });
+  parts.tiles.addEventListener("dragover", (event) => event.preventDefault());
+  parts.tiles.addEventListener("drop", (event) => {
+    event.preventDefault();
+    if (lifted >= 0 && place(event) >= 0) move(lifted, place(event)).catch(complain);
+    lifted = -1;
+  });
+}
+
+// ---- head, proof, facts ------------------------------------------------------------------------------------------------------------
+
+function paintHead() {
+  const { tool, plan, policy } = state;
+  const learned = `Learned from ${plural(policy.learned_from.demonstrations, "demonstration")} and ${plural(policy.learned_from.answers, "answer")}.`;
+  fill(parts.head, h("div.title", {}, h("h1", {}, `The order for ${tool.name}`), h("p", {}, `${plan.demonstrated ? "You have demonstrated this tool." : "Nobody has demonstrated this tool."} ${learned}`)),
+    h("button.btn.quiet", { type: "button", style: { "margin-left": "auto" }, dataset: { key: "weights" }, onclick: showWeights }, icon("table"), "What it learned"),
+    h("button.btn.quiet", { type: "button", dataset: { key: "export", tip: "The order, its cost and its explanation as JSON" }, onclick: save }, icon("download"), "Export"),
+    h("div.next", { style: { "margin-left": "0" } }, h("p", {}, h("span.kicker", {}, "Next: watch the robot do it"), "in simulation"), h("a.btn.primary", { href: pageAddress(shell.projectId, "robot", { plan: plan.id }) }, "Open on the robot")));
+}
+
+function paintProof() {
+  const { plan } = state;
+  parts.proof.dataset.proved = String(plan.proved);
+  fill(parts.proof, icon(plan.proved ? "shield" : "warn"), h("div", {}, h("b", {}, plan.proved ? "Proved cheapest" : "Best found"),
+    h("span.small.muted", {}, plan.proved ? `All ${plan.orders} orders considered, in ${number(plan.milliseconds)} ms.` : `${sentence(plan.method)}. No proof for ${plural(plan.sequence.length, "region")}.`)));
+  const fact = (term, value, tip = null) => h("div.fact", { dataset: tip ? { tip } : {} }, h("dt", {}, term), h("dd", {}, value));
+  fill(parts.facts, fact("Cost", number(plan.cost), "C = w · Φ, added along the order; low is good"),
+    fact("Equally cheap", plan.ties === 1 ? "this one only" : `${Number(plan.ties).toLocaleString("en")} orders`, "Orders in the lowest cost class (relative 1e-7)"),
+    fact("Effort", plan.effort === null ? "not taught yet" : number(plan.effort), "eta, Eq. 8: breaks ties among equally cheap orders"),
+    fact("Tie settled by", plan.tie_settled_by ?? (plan.ties === 1 ? "no tie" : "lowest letters")));
+}
+
+function showWeights() {
+  const { policy } = state;
+  const most = Math.max(1e-12, ...policy.weights.map((weight) => Math.abs(weight.value)));
+  const row = (weight) => h(`tr${weight.identifiable ? "" : ".open"}`, { dataset: weight.identifiable ? {} : { tip: "The demonstrations do not decide this weight: it can be anything without changing which order is cheapest." } },
+    h("td", {}, h("span", { dataset: { tip: weight.symbol } }, weight.label)), h("td.num", {}, number(weight.value)), h("td", { style: { width: "8rem" } }, h("div.progress", {}, h("i", { style: { width: `${(100 * Math.abs(weight.value)) / most}%` } }))), h("td.small", {}, weight.identifiable ? "" : "not decided"));
+  fill(parts.weights, h("h2", {}, "What the policy has learned"), h("p.small.muted", {}, `${policy.name}. A larger weight makes it dearer; feature set ${policy.feature_set}.`),
+    h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, "What costs"), h("th.num", {}, "Weight"), h("th", {}, ""), h("th", {}, ""))), h("tbody", {}, policy.weights.map(row))),
+    policy.effort_weights ? [h("h3", { style: { "margin-top": "var(--s-4)" } }, "Effort"), h("table", {}, h("tbody", {}, policy.effort_weights.map((weight) => h("tr", {}, h("td", {}, weight.label), h("td.num", {}, number(weight.value))))))] : null,
+    h("form", { method: "dialog" }, h("button.btn", {}, "Close")));
+  parts.weights.showModal();
+}
+
+function save() {
+  const link = h("a", { href: URL.createObjectURL(new Blob([JSON.stringify(state.plan, null, 2)], { type: "application/json" })), download: `${state.tool.name} order.json` });
+  link.click();
+  URL.revokeObjectURL(link.href);
+}
+
+// ---- reading -----------------------------------------------------------------------------------------------------------------------
+
+function drawCrumb() {
+  shell.crumb(state.tool.name, () => state.tools.map((tool) => ({ label: tool.name, note: tool.demonstrated ? "recorded" : "new", current: tool.id === state.tool.id, run: () => open(tool).catch(complain) })));
+}
+
+async function open(tool) {
+  state.tool = tool;
+  remember("tool", tool.id);
+  state.plan = await post(`/policies/${state.policy.id}/plans`, { tool_id: tool.id });
+  state.order = [...state.plan.sequence];
+  state.whatif = null;
+  state.stepper.reset(state.order.length);
+  drawCrumb();
+  paint();
+}
+
+function paint() {
+  paintHead();
+  paintProof();
+  paintChart();
+  paintOrder();
+  paintWhatIf();
+}
+
+async function load() {
+  state.policies = await all(`/projects/${shell.projectId}/policies`);
+  state.policy = state.policies.reduce((latest, policy) => (!latest || policy.created_at > latest.created_at ? policy : latest), null);
+  state.tools = (await all(`/projects/${shell.projectId}/tools`)).filter((tool) => tool.state === "ready");
+}
+
+function showEmpty() {
+  const none = state.tools.length === 0;
+  fill(shell.main, h("div.head", {}, h("div.title", {}, h("h1", {}, "Policy"), h("p", {}, "The cheapest order for a tool nobody has demonstrated."))),
+    h("div.empty", {}, h("h2", {}, none ? "No tool is ready yet" : "Nothing has been learned yet"), h("p", {}, none ? "Upload a tool first." : "Record demonstrations, then teach: Apprentice learns what makes your order good."),
+      h("a.btn.primary", { href: pageAddress(shell.projectId, none ? "tools" : "teach") }, none ? "Go to the tools" : "Go to teach")));
+}
+
+async function start() {
+  await load();
+  if (!state.policy || !state.tools.length) return showEmpty();
+  state.stepper = new Stepper({ n: 1, onStep: showOrder, name: "Play the order" });
+  parts.stage.append(h("div.bl", {}, h("div.play", {}, state.stepper.node)));
+  state.stepper.node.style.flex = "1";
+  fill(shell.main, parts.head, h("div.policy-upper", {}, parts.stage, h("aside.card.fill", {}, parts.proof, parts.facts, parts.whatif)),
+    h("section.card.policy-lower", { "aria-label": "Why this order" }, h("div.bar-head", {}, h("h2.nowrap", {}, "Why this order"), h("span.small.muted.nowrap", {}, "cost per step"), parts.legend), parts.chart, parts.tiles, h("p.underline", {}, "Drag a region to another place, or use Alt with the arrows.")), parts.weights);
+  state.view = new View3D(parts.stage, { projectId: shell.projectId, name: "policy" });
+  movable();
+  const wanted = query("tool");
+  await open(state.tools.find((tool) => tool.id === wanted) ?? state.tools.find((tool) => !tool.demonstrated) ?? state.tools[0]);
+  addEventListener("resize", gathered(paintChart, 150));
+  addEventListener("themechange", paint);
+  listen("policy.changed", gathered(() => load().then(() => open(state.tools.find((tool) => tool.id === state.tool.id) ?? state.tools[0])).catch(complain), 200));
+  return undefined;
+}
+
+try {
+  await start();
+} catch (error) {
+  showFault(shell.main, error);
+  throw error;
+}
