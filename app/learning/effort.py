@@ -82,7 +82,8 @@ class EffortState:
 
 
 def _question_from(value: dict[str, Any]) -> PreferenceQuestion:
-    return PreferenceQuestion(**{k: tuple(v) if isinstance(v, list) else v for k, v in value.items()})
+    fields: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in value.items()}
+    return PreferenceQuestion(**fields)
 
 
 @dataclass(frozen=True)

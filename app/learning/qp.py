@@ -30,16 +30,16 @@ def solve(program: QuadraticProgram) -> Array:
     Raises:
         NotConverged: The solver gave up, which for these always feasible soft programs means badly scaled input.
     """
-    settings = clarabel.DefaultSettings()
+    settings = clarabel.DefaultSettings()  # pyright: ignore[reportAttributeAccessIssue]
     settings.verbose = False
     settings.max_threads = 1  # same bits on every machine size
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = ACCURACY
-    answer = clarabel.DefaultSolver(
+    answer = clarabel.DefaultSolver(  # pyright: ignore[reportAttributeAccessIssue]
         sparse.diags_array(program.curvature, format="csc"),
         program.slope,
         sparse.csc_array(program.rows),
         program.limits,
-        [clarabel.NonnegativeConeT(len(program.limits))],
+        [clarabel.NonnegativeConeT(len(program.limits))],  # pyright: ignore[reportAttributeAccessIssue]
         settings,
     ).solve()
     if str(answer.status) not in ("Solved", "AlmostSolved"):

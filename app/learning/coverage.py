@@ -1,0 +1,263 @@
+"""How much of what matters the demonstrations have shown (Eq. 5-6), and which one to record next.
+
+For each suspected interaction of two factors every step of a demonstration falls into one of 3 x 3 cells. A cell is captured
+when the demonstrations hold it and the other features are evenly spread over its steps; rho is the captured share of the
+cells that occur on the project's tools at all.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.geometry.tool import region_letters
+from app.learning.levels import Levels, Transitions, factor_groups, measure_levels, sample_transitions, sequence_values
+from app.learning.uniformity import uniform_p_value
+from app.sequencing.features import FeatureSet, Interaction, factor_label
+from app.sequencing.problem import SequencingProblem
+
+CellState = Literal["captured", "uneven", "missing", "impossible"]
+Grid = NDArray[np.int64]
+
+SIGNIFICANCE = 0.05
+SHOWN = 3  # regions named per tool and cell
+LEVEL_WORDS = ("small", "middle", "large")
+PHRASES = {"height": "step in height", "curvature": "change of curvature", "orientation": "turn towards neighbours"}
+RULE = (
+    "A situation counts as covered when a demonstration contains it and every other feature is evenly spread over those steps "
+    "(chi-squared at 0.05, exact for small counts, corrected for the number of features)."
+)
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One combination of levels."""
+
+    state: CellState
+    count: int  # demonstrated steps
+    p_value: float | None  # of the least even other feature, corrected; None without steps
+    tools: tuple[tuple[int, tuple[int, ...]], ...]  # tools that have it, with the regions where it is most common
+    text: str  # "a large step in height with a small change of curvature"
+    request: str  # what to do about it, empty when captured or impossible
+
+
+@dataclass(frozen=True)
+class InteractionTable:
+    """3 x 3 cells; rows are levels of the first factor, columns of the second, both rising."""
+
+    interaction: Interaction
+    row_words: tuple[str, ...]
+    column_words: tuple[str, ...]
+    cells: tuple[tuple[Cell, ...], ...]
+
+
+@dataclass(frozen=True)
+class Request:
+    """A demonstration worth recording."""
+
+    text: str
+    tool_index: int
+    regions: tuple[int, ...]
+    gain: float  # in rho, mean over orders of the tool
+
+
+@dataclass(frozen=True)
+class CoverageReport:
+    """Coverage of a set of demonstrations."""
+
+    rho: float
+    captured: int
+    possible: int
+    steps: int
+    tables: tuple[InteractionTable, ...]
+    thresholds: Levels
+    requests: tuple[Request, ...]  # most useful first
+    left_out: tuple[int, ...]  # tools with another feature set, which can't be compared
+    rule: str = RULE
+
+
+def coverage(
+    problems: list[SequencingProblem], demonstrations: list[tuple[int, tuple[int, ...]]], interactions: tuple[Interaction, ...]
+) -> CoverageReport:
+    """Coverage rho, the tables behind it and what to record next.
+
+    Args:
+        problems: All tools of the project.
+        demonstrations: (tool index, sequence).
+        interactions: The ones the expert suspects.
+
+    Returns:
+        The report; tools without a demonstration are candidates for a request.
+
+    Raises:
+        UnknownFeature: An interaction names a factor the tools don't have.
+
+    Paper:
+        Levels are terciles over sampled transitions of all tools (`levels`). A cell no sampled transition falls into is impossible and
+            does not count in rho; the paper divides by all 9.
+        Each other feature is tested for even spread over the levels that occur within that cell on any tool; p-values are
+            Bonferroni-corrected, otherwise ten features would often fail by chance. A feature with one value in more than a third of all
+            transitions has no three levels and is not tested. The authors' code uses a skewness limit instead.
+        The gain of a tool is the mean rise of rho over a few random orders of it: which one the expert would choose isn't known yet.
+    """
+    first = demonstrations[0][0] if demonstrations else 0
+    kind = [p.features for p in problems]
+    alike = [i for i in range(len(problems)) if kind[i] == kind[first]]
+    if not alike:
+        return CoverageReport(0.0, 0, 0, 0, (), Levels((), (), ()), (), ())
+    study = _Study.of(problems, alike, interactions)
+    shown = [study.levels.of(sequence_values(problems[i], s)) for i, s in demonstrations if i in study.sampled]
+    steps = np.concatenate(shown) if shown else np.zeros((0, len(study.levels.keys)), np.int64)
+    states = study.states(steps)
+    captured, possible = _tally(states)
+    waiting = [i for i in alike if i not in {i for i, _ in demonstrations}]
+    tables = tuple(study.table(k, states[k], waiting) for k in range(len(interactions)))
+    requests = sorted(study.requests(steps, tables, waiting, captured, possible), key=lambda r: (-r.gain, r.tool_index))
+    left_out = tuple(i for i in range(len(problems)) if i not in alike)
+    return CoverageReport(
+        rho=captured / possible if possible else 0.0,
+        captured=captured,
+        possible=possible,
+        steps=len(steps),
+        tables=tables,
+        thresholds=study.levels,
+        requests=tuple(requests),
+        left_out=left_out,
+    )
+
+
+@dataclass(frozen=True)
+class _Judged:
+    """A cell without its words."""
+
+    state: CellState
+    count: int
+    p_value: float | None
+
+
+@dataclass(frozen=True)
+class _Study:
+    """The tools' transitions in levels."""
+
+    interactions: tuple[Interaction, ...]
+    axes: tuple[tuple[int, int], ...]  # per interaction, its two factors' positions in `levels.keys`
+    phrases: tuple[tuple[str, str], ...]
+    levels: Levels
+    sampled: dict[int, Transitions]
+    grids: dict[int, Grid]  # tool index -> levels of its transitions (T, factors)
+    spread: tuple[NDArray[np.bool_], ...]  # per interaction (9, factors, 3): which levels occur in a cell on any tool
+    tested: tuple[int, ...]  # factors whose terciles differ, so that an even spread means something
+    regions: dict[int, int]  # tool index -> number of regions
+
+    @staticmethod
+    def of(problems: list[SequencingProblem], alike: list[int], interactions: tuple[Interaction, ...]) -> "_Study":
+        features = problems[alike[0]].features
+        phrases = tuple((_phrase(i.first, features), _phrase(i.second, features)) for i in interactions)
+        groups = factor_groups(features)
+        keys = tuple(groups)
+        home = {key: next(g for g in keys if set(features.factors[key]) <= set(groups[g])) for key in features.factors}
+        axes = tuple((keys.index(home[i.first]), keys.index(home[i.second])) for i in interactions)
+        sampled = {i: sample_transitions(problems[i]) for i in alike}
+        levels = measure_levels(keys, np.concatenate([t.values for t in sampled.values()]))
+        grids = {i: levels.of(t.values) for i, t in sampled.items()}
+        everything = np.concatenate(list(grids.values()))
+        spread = tuple(_counts(everything, pair) > 0 for pair in axes)
+        tested = tuple(f for f in range(len(keys)) if len(np.unique(everything[:, f])) == 3)
+        return _Study(interactions, axes, phrases, levels, sampled, grids, spread, tested, {i: problems[i].n for i in alike})
+
+    def states(self, steps: Grid) -> list[list[_Judged]]:
+        """Per interaction, its nine cells judged from demonstrated steps (S, factors)."""
+        judged = []
+        for pair, occurs in zip(self.axes, self.spread, strict=True):
+            counts = _counts(steps, pair)
+            judged.append([self._judge(counts[cell], occurs[cell], pair) for cell in range(9)])
+        return judged
+
+    def _judge(self, counts: Grid, occurs: NDArray[np.bool_], pair: tuple[int, int]) -> _Judged:
+        count = int(counts[0].sum())
+        if not count:
+            return _Judged("missing" if occurs[0].any() else "impossible", 0, None)
+        others = [f for f in self.tested if f not in pair]
+        possible = occurs | (counts > 0)  # the sample may have missed what a demonstration shows
+        tests = [uniform_p_value(tuple(int(c) for c in counts[f][possible[f]])) for f in others if possible[f].sum() > 1]
+        p = min(1.0, min(tests, default=1.0) * max(len(tests), 1))
+        return _Judged("captured" if p >= SIGNIFICANCE else "uneven", count, p)
+
+    def places(self, k: int, cell: int) -> tuple[tuple[int, tuple[int, ...]], ...]:
+        """Tools that have the cell, and where on them it is most common."""
+        found = []
+        for i, grid in self.grids.items():
+            here = _cell(grid, self.axes[k]) == cell
+            if here.any():
+                often = np.bincount(self.sampled[i].region[here], minlength=self.regions[i])
+                top = np.argsort(-often, kind="stable")[:SHOWN]
+                found.append((i, tuple(int(a) for a in top if often[a])))
+        return tuple(found)
+
+    def table(self, k: int, judged: list[_Judged], waiting: list[int]) -> InteractionTable:
+        cells = []
+        for cell, j in enumerate(judged):
+            text = self.words(k, cell)
+            tools = self.places(k, cell)
+            cells.append(Cell(j.state, j.count, j.p_value, tools, text, _advice(j.state, text, tools, waiting)))
+        return InteractionTable(self.interactions[k], LEVEL_WORDS, LEVEL_WORDS, tuple(tuple(cells[r : r + 3]) for r in (0, 3, 6)))
+
+    def words(self, k: int, cell: int) -> str:
+        row, column = divmod(cell, 3)
+        return f"a {LEVEL_WORDS[row]} {self.phrases[k][0]} with a {LEVEL_WORDS[column]} {self.phrases[k][1]}"
+
+    def requests(
+        self, steps: Grid, tables: tuple[InteractionTable, ...], waiting: list[int], captured: int, possible: int
+    ) -> list[Request]:
+        """One request per tool without a demonstration that is expected to raise rho."""
+        found = []
+        for i in waiting:
+            gains = []
+            for order in self.sampled[i].orders[:6]:
+                now, of = _tally(self.states(np.concatenate([steps, self.grids[i][order]])))
+                gains.append(now / of - (captured / possible if possible else 0.0))
+            weak = [(c, dict(c.tools)[i]) for t in tables for row in t.cells for c in row if c.request and i in dict(c.tools)]
+            if weak and np.mean(gains) > 1e-9:
+                weak.sort(key=lambda pair: pair[0].state != "missing")
+                regions = tuple(dict.fromkeys(a for _, own in weak[:2] for a in own))[:SHOWN]
+                letters = region_letters(self.regions[i])
+                places = _listed([letters[a] for a in sorted(regions)])
+                text = f"{_listed([c.text for c, _ in weak[:2]])}, most of all at {places}"
+                found.append(Request(text[0].upper() + text[1:], i, tuple(sorted(regions)), float(np.mean(gains))))
+        return found
+
+
+def _advice(state: CellState, text: str, tools: tuple[tuple[int, tuple[int, ...]], ...], waiting: list[int]) -> str:
+    if state in ("captured", "impossible"):
+        return ""
+    fresh = sum(i in waiting for i, _ in tools)
+    if not fresh:
+        return f"Only tools that already have a demonstration show {text}: record another order there, or add a tool."
+    need = "No demonstration shows" if state == "missing" else "The steps shown are too much alike for"
+    return f"{need} {text}; {fresh} tool{'' if fresh == 1 else 's'} without a demonstration {'has' if fresh == 1 else 'have'} it."
+
+
+def _phrase(key: str, features: FeatureSet) -> str:
+    label = factor_label(key, features)  # refuses an unknown factor
+    return PHRASES.get(key, label)
+
+
+def _cell(grid: Grid, pair: tuple[int, int]) -> Grid:
+    return 3 * grid[:, pair[0]] + grid[:, pair[1]]
+
+
+def _counts(grid: Grid, pair: tuple[int, int]) -> Grid:
+    """(9, factors, 3) how often each level of each factor occurs in each cell."""
+    factors = grid.shape[1]
+    index = (_cell(grid, pair)[:, None] * factors + np.arange(factors)) * 3 + grid
+    return np.bincount(index.ravel(), minlength=9 * factors * 3).reshape(9, factors, 3)
+
+
+def _tally(states: list[list[_Judged]]) -> tuple[int, int]:
+    flat = [j.state for table in states for j in table]
+    return sum(s == "captured" for s in flat), sum(s != "impossible" for s in flat)
+
+
+def _listed(names: list[str]) -> str:
+    return ", ".join(names[:-1]) + " and " + names[-1] if len(names) > 1 else "".join(names)

@@ -1,0 +1,88 @@
+"""Low, middle and high values of each feature factor over a project's tools (Sec. IV-C)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.learning.qp import Array
+from app.sequencing.features import FeatureSet
+from app.sequencing.problem import SequencingProblem
+
+ORDERS = 24  # random orders per tool whose steps stand for all transitions
+SEED = 20230523  # fixed: the same tools always give the same levels
+EVEN = 1e-9  # values this close (as a share of the range) are on the same side of a threshold
+
+
+@dataclass(frozen=True)
+class Transitions:
+    """Sampled transitions of one tool."""
+
+    values: Array  # (T, factors)
+    region: NDArray[np.int64]  # (T,) the region worked on
+    orders: tuple[NDArray[np.int64], ...]  # per sampled order, indices of its steps in `values`
+
+
+@dataclass(frozen=True)
+class Levels:
+    """Two thresholds per factor, stored with every report."""
+
+    keys: tuple[str, ...]
+    low: tuple[float, ...]  # at most this is level 0
+    high: tuple[float, ...]  # above this is level 2
+
+    def of(self, values: Array) -> NDArray[np.int64]:
+        """Level 0, 1 or 2 of factor values (..., factors)."""
+        return (values > np.array(self.low)).astype(np.int64) + (values > np.array(self.high)).astype(np.int64)
+
+
+def factor_groups(features: FeatureSet) -> dict[str, tuple[int, ...]]:
+    """Factors that partition the columns: a feature split over several columns counts once."""
+    joint = {k: c for k, c in features.factors.items() if len(c) > 1}
+    inside = {i for c in joint.values() for i in c}
+    single = {column.key: (i,) for i, column in enumerate(features.columns) if i not in inside}
+    return {**single, **joint}
+
+
+def factor_values(problem: SequencingProblem, values: Array) -> Array:
+    """(..., factors) from feature values (..., n + m)."""
+    groups = factor_groups(problem.features)
+    return np.stack([values[..., list(columns)].sum(axis=-1) for columns in groups.values()], axis=-1)
+
+
+def sample_transitions(problem: SequencingProblem) -> Transitions:
+    """Every possible next region at every step of a few random orders: early, middle and late steps weigh the same."""
+    n, generator = problem.n, np.random.default_rng([SEED, problem.n])
+    orders = np.array([generator.permutation(n) for _ in range(ORDERS)])
+    done = _prefixes(orders)
+    sets, region = np.nonzero(~done)
+    values = factor_values(problem, problem.values(done))[sets, region]
+    where = np.full(done.shape, -1, np.int64)
+    where[sets, region] = np.arange(len(sets))
+    steps = where[np.arange(len(done)), orders.ravel()].reshape(ORDERS, n)
+    return Transitions(values, region, tuple(steps))
+
+
+def sequence_values(problem: SequencingProblem, sequence: tuple[int, ...]) -> Array:
+    """Factor values of each step, (N, factors)."""
+    order = np.array([sequence])
+    return factor_values(problem, problem.values(_prefixes(order)))[np.arange(problem.n), order[0]]
+
+
+def measure_levels(keys: tuple[str, ...], values: Array) -> Levels:
+    """Terciles of factor values (T, factors).
+
+    Paper: thresholds are typed in by hand there. Terciles make each level equally common over the tools at hand, which is what an even
+        spread is later tested against; a factor with many equal values (most steps touch a finished region) has fewer levels.
+    """
+    low, high = np.quantile(values, [1 / 3, 2 / 3], axis=0)
+    slack = EVEN * np.ptp(values, axis=0)
+    return Levels(keys, tuple(float(x) for x in low + slack), tuple(float(x) for x in high + slack))
+
+
+def _prefixes(orders: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(orders * N, N) finished regions before each step."""
+    count, n = orders.shape
+    rank = np.empty_like(orders)
+    rank[np.arange(count)[:, None], orders] = np.arange(n)
+    return (rank[:, None, :] < np.arange(n)[None, :, None]).reshape(count * n, n)
