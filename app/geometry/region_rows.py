@@ -85,8 +85,7 @@ def read_rows(text: str, layout: Layout | None, file_name: str) -> tuple[Layout,
     places = _places(header, layout, file_name)
     names = {key: header[place] for key, place in places.items()}
     rows = [
-        Row(number, cells[places["id"]].strip().lower(), {k: _cell(cells, p) for k, p in places.items()}, names)
-        for number, cells in body
+        Row(number, cells[places["id"]].strip().lower(), {k: _cell(cells, p) for k, p in places.items()}, names) for number, cells in body
     ]
     if not 1 <= len(rows) <= MOST_ROWS:
         raise MalformedTable(f"{file_name} lists {len(rows)} regions. Expected 1 to {MOST_ROWS}, one per line after the header.")
@@ -121,7 +120,9 @@ def _plain(name: str) -> str:
 def _recognise(header: list[str], file_name: str) -> Layout:
     """The layout whose columns the header names best."""
     names = {_plain(h) for h in header}
-    shares = {layout: len(names & {_plain(c) for c in columns.values()}) / len(columns) for layout, columns in _COLUMNS.items()}
+    shares: dict[Layout, float] = {
+        layout: len(names & {_plain(c) for c in columns.values()}) / len(columns) for layout, columns in _COLUMNS.items()
+    }
     best = max(shares, key=lambda layout: shares[layout])
     if shares[best] < 0.5:
         known = "; ".join(", ".join(columns.values()) for columns in _COLUMNS.values())
@@ -135,7 +136,8 @@ def _places(header: list[str], layout: Layout, file_name: str) -> dict[str, int]
     places = {key: there.index(_plain(name)) for key, name in _COLUMNS[layout].items() if _plain(name) in there}
     missing = [name for key, name in _COLUMNS[layout].items() if key not in places and key not in _OPTIONAL]
     if missing:
-        raise MalformedTable(f"{file_name}: the header has no column '{missing[0]}'. A {layout} table needs: {', '.join(_COLUMNS[layout].values())}.")
+        needed = ", ".join(_COLUMNS[layout].values())
+        raise MalformedTable(f"{file_name}: the header has no column '{missing[0]}'. A {layout} table needs: {needed}.")
     return places
 
 

@@ -77,11 +77,12 @@ def _border(row: Row, ids: dict[str, int], layout: Layout, odd: list[str]) -> Bo
     count = sum(len(side) for side in sides)
     lengths = row.numbers("lengths")
     if len(lengths) < count or sum(lengths) <= 0:
-        row.refuse("lengths", f"holds {len(lengths)} lengths for {count} entries in '{row.headers['neighbours']}'. Write one length per entry.")
+        place = row.headers["neighbours"]
+        row.refuse("lengths", f"holds {len(lengths)} lengths for {count} entries in '{place}'. Write one length above 0 per entry.")
     if len(lengths) > count:
         odd.append(
             f"Row {row.letter}: {row.cells['lengths']!r} in '{row.headers['lengths']}' holds {len(lengths)} lengths for {count} neighbours,"
-            " probably a comma in place of a point; read as the authors' code does, the surplus counts towards the perimeter only."
+            f" probably a comma in place of a point; read as the authors' code does, the first {count} are taken in order."
         )
     angles = _angles(row, sides, odd) if layout == "real" else ()
     corners = [_region(row, "corners", t, ids) for t in row.items("corners") if t]
@@ -98,7 +99,8 @@ def _sides(row: Row, ids: dict[str, int]) -> tuple[tuple[int, ...], ...]:
             sides[-1].append(_region(row, "neighbours", token, ids))
     if len(sides) != 4 or not all(sides):
         filled = sum(bool(side) for side in sides)
-        row.refuse("neighbours", f"lists {filled} sides instead of 4. Separate the four sides by x and write O for the tool's edge: O,x,b,c,x,d,x,O.")
+        how = "Separate the four sides by x and write O for the tool's edge: O,x,b,c,x,d,x,O."
+        row.refuse("neighbours", f"lists {filled} sides instead of 4. {how}")
     return tuple(tuple(side) for side in sides)
 
 
@@ -115,9 +117,13 @@ def _angles(row: Row, sides: tuple[tuple[int, ...], ...], odd: list[str]) -> tup
     """Neighbour angles in rad, at the same places as the neighbours; the entry at an outer edge may be anything."""
     listed, entries = [b for side in sides for b in side], row.items("angles")
     if len(entries) < len(listed):
-        row.refuse("angles", f"holds {len(entries)} angles for {len(listed)} neighbours. Write one angle in degrees per neighbour, x at the tool's edge.")
+        how = "Write one angle in degrees per neighbour, x at the tool's edge."
+        row.refuse("angles", f"holds {len(entries)} angles for {len(listed)} neighbours. {how}")
     if len(entries) > len(listed):
-        odd.append(f"Row {row.letter}: {row.cells['angles']!r} in '{row.headers['angles']}' holds {len(entries)} angles for {len(listed)} neighbours; the last ones are left out.")
+        odd.append(
+            f"Row {row.letter}: {row.cells['angles']!r} in '{row.headers['angles']}' holds {len(entries)} angles"
+            f" for {len(listed)} neighbours; the last ones are left out."
+        )
     return tuple(math.radians(row.number_in("angles", e)) if b >= 0 else 0.0 for b, e in zip(listed, entries, strict=False))
 
 
@@ -178,7 +184,8 @@ def _outline(row: Row) -> Array:
     """'0,0,x,1.5,0,x,1.5,8,x,0,8' -> (4, 2) corner points."""
     points = [p.strip(" ,").split(",") for p in row.cells["outline"].lower().split("x")]
     if len(points) < 3 or any(len(p) != 2 for p in points):
-        row.refuse("outline", "is not a list of corner points. Write x and y of each corner, with x between corners: 0,0,x,1.5,0,x,1.5,8,x,0,8.")
+        how = "Write x and y of each corner, with x between corners: 0,0,x,1.5,0,x,1.5,8,x,0,8."
+        row.refuse("outline", f"is not a list of corner points. {how}")
     outline = np.array([[row.number_in("outline", c.strip()) for c in p] for p in points])
     if np.ptp(outline, axis=0).min() <= 0:
         row.refuse("outline", "encloses no area. The corner points must span a rectangle.")
@@ -223,7 +230,8 @@ def _expert(rows: list[Row], ids: dict[str, int], odd: list[str]) -> tuple[int, 
     order = [_region(row, "sequence", token, ids) for token in row.items("sequence")]
     wrong = [letter for letter, a in ids.items() if order.count(a) != 1]
     if wrong or len(order) != len(ids):
-        row.refuse("sequence", f"does not hold every region once: see {', '.join(wrong) or 'O'}. Write all of {','.join(ids)} in the expert's order.")
+        how = f"Write all of {','.join(ids)} in the expert's order."
+        row.refuse("sequence", f"does not hold every region once: see {', '.join(wrong) or 'O'}. {how}")
     return tuple(order)
 
 
@@ -242,8 +250,9 @@ def _describe(graph: RegionGraph, a: int, place: Array) -> str:
     """'Back left, curved inwards'."""
     along = ("Back", "Middle", "Front")[min(2, int(place[1] * 3))]
     across = ("left", "", "right")[min(2, int(place[0] * 3))]
-    flat = 5.0 if graph.source == "real" else 0.05  # real tables: a score, below 0 concave, above 5 convex
-    bend = "curved inwards" if graph.curvature[a] < min(0.0, flat - 5) - (flat < 1) * flat else "curved outwards" if graph.curvature[a] > flat else "flat"
+    inwards, outwards = (0.0, 5.0) if graph.source == "real" else (-0.05, 0.05)  # real tables: a score from -5 to 10
+    k = graph.curvature[a]
+    bend = "curved inwards" if k < inwards else "curved outwards" if k > outwards else "flat"
     return f"{along} {across}".strip() + f", {bend}"
 
 

@@ -1,5 +1,7 @@
 """A drawn stand-in for a tool that is known only from a region table: patches on a rectangle, lifted to their heights."""
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -52,7 +54,7 @@ def rows_of_patches(index: Array, area: Array) -> tuple[Array, Array]:
 def _lines(marks: Array) -> Array:
     """Grid lines through all marks, with further ones between where they are far apart."""
     marks = np.unique(marks.round(9))
-    parts = [np.linspace(a, b, max(1, int(np.ceil((b - a) / CELL))) + 1)[:-1] for a, b in zip(marks, marks[1:], strict=False)]
+    parts = [np.linspace(a, b, max(1, int(np.ceil((b - a) / CELL))) + 1)[:-1] for a, b in pairwise(marks)]
     return np.concatenate([*parts, marks[-1:]])
 
 

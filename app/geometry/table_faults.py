@@ -52,7 +52,10 @@ def _faults_of_pair(name: str, other: str, a: int, b: int, mine: ListedBorder, t
     if graph.source == "real":
         angle, turned = np.degrees(graph.angle[a, b]), np.degrees(graph.angle[b, a])
         if abs(angle + turned) > EQUAL * 360:
-            found.append(f"Rows {name} and {other}: the angle between them is {angle:g} degrees in row {name} and {turned:g} in row {other}; expected opposite signs.")
+            found.append(
+                f"Rows {name} and {other}: the angle between them is {angle:g} degrees in row {name} and {turned:g} in row {other};"
+                " expected opposite signs."
+            )
     return found
 
 
@@ -65,7 +68,8 @@ def _synthetic_sizes(letters: Sequence[str], rows: Sequence[Row], graph: RegionG
     found, box = [], np.prod(graph.high - graph.low, axis=1)
     for a, name in enumerate(letters):
         if abs(box[a] - graph.area[a]) > EQUAL * box[a]:
-            found.append(f"Row {name}: the size {rows[a].cells['size']!r} has area {graph.area[a]:g}, its corner points enclose {box[a]:g}.")
+            size = rows[a].cells["size"]
+            found.append(f"Row {name}: the size {size!r} has area {graph.area[a]:g}, its corner points enclose {box[a]:g}.")
         points = {tuple(map(float, p.strip(" ,").split(","))) for p in rows[a].cells["outline"].lower().split("x")}
         if points != {(x, y) for x in (graph.low[a, 0], graph.high[a, 0]) for y in (graph.low[a, 1], graph.high[a, 1])}:
             found.append(f"Row {name}: the corner points {rows[a].cells['outline']!r} are not those of a rectangle; their box is used.")

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from app.errors import UnknownFeature
 from app.geometry.tool import Array, RegionGraph
+from app.sequencing.kernels import box_gaps
 
 Sets = NDArray[np.bool_]  # (M, N) one set of finished regions per row
 
@@ -64,7 +65,7 @@ _UP_DOWN = (Feature("height_up", "Step up in height", "phi_10"), Feature("height
 
 
 def _set(name: str, columns: tuple[Feature, ...]) -> FeatureSet:
-    factors = {c.key: (i,) for i, c in enumerate(columns)}
+    factors: dict[str, tuple[int, ...]] = {c.key: (i,) for i, c in enumerate(columns)}
     factors.setdefault("height", tuple(i for i, c in enumerate(columns) if c.key.startswith("height")))
     return FeatureSet(name, 1, columns, factors)
 
@@ -235,26 +236,7 @@ def _gaps(graph: RegionGraph, inside: Sets) -> Array:
     tables its width by height. For meshes it is the share of each region's own box that lies in it, times the region's
     area: within the tool's outline, never below the area of S, and the same as the real tables' on a grid.
     """
-    low = np.where(inside[:, :, None], graph.low, np.inf).min(axis=1)
-    high = np.where(inside[:, :, None], graph.high, -np.inf).max(axis=1)
-    many = inside.sum(axis=1) > 1
-    low, high = np.where(many[:, None], low, 0.0), np.where(many[:, None], high, 1.0)
-    if graph.source == "synthetic":
-        box = np.prod(high - low, axis=1)
-    elif graph.source == "real":
-        within = ((low[:, None] <= graph.low) & (graph.low <= high[:, None])).all(axis=2)
-        box = within @ graph.area
-    else:
-        box = np.prod([_overlap(graph, low, high, axis) for axis in (0, 1)], axis=0) @ graph.area
-    return np.where(many, 1 - (inside @ graph.area) / np.where(many, box, 1.0), 0.0)
-
-
-def _overlap(graph: RegionGraph, low: Array, high: Array, axis: int) -> Array:
-    """Share of each region's extent along one axis that lies in each box, (M, N); 0 or 1 for regions without extent."""
-    start, end = graph.low[:, axis], graph.high[:, axis]
-    common = np.minimum(end, high[:, axis, None]) - np.maximum(start, low[:, axis, None])
-    flat = end <= start
-    return np.where(flat, common >= 0, np.clip(common, 0, None) / np.where(flat, 1.0, end - start))
+    return box_gaps(np.ascontiguousarray(inside), graph.low, graph.high, graph.area, graph.source == "synthetic")
 
 
 _DEFINITIONS: dict[str, Callable[[RegionGraph, Sets], Array]] = {

@@ -12,6 +12,44 @@ from app.geometry.tool import Array
 
 
 @nb.njit(cache=True)
+def box_gaps(inside: NDArray[np.bool_], low: Array, high: Array, area: Array, plain: bool) -> Array:
+    """1 - area(S) / area(box of S) for each row S of `inside` (M, N); 0 for at most one region.
+
+    `low` and `high` (N, 2) are the regions' boxes. The box's area is its width by height if `plain`, else the regions'
+    areas times the share of their own box inside it; a region without extent along an axis is inside or not.
+    """
+    m, n = inside.shape
+    out = np.zeros(m)
+    lo, hi = np.zeros(2), np.zeros(2)
+    for i in range(m):
+        lo[:], hi[:] = np.inf, -np.inf
+        members, own = 0, 0.0
+        for a in range(n):
+            if inside[i, a]:
+                members += 1
+                own += area[a]
+                for k in range(2):
+                    lo[k], hi[k] = min(lo[k], low[a, k]), max(hi[k], high[a, k])
+        if members < 2:
+            continue
+        box = (hi[0] - lo[0]) * (hi[1] - lo[1])
+        if not plain:
+            box = 0.0
+            for b in range(n):
+                share = 1.0
+                for k in range(2):
+                    common = min(high[b, k], hi[k]) - max(low[b, k], lo[k])
+                    extent = high[b, k] - low[b, k]
+                    if extent > 0:
+                        share *= max(common, 0.0) / extent
+                    elif common < 0:
+                        share = 0.0
+                box += share * area[b]
+        out[i] = 1 - own / box
+    return out
+
+
+@nb.njit(cache=True)
 def lowest_to_go(c: Array, n: int) -> Array:
     """Cheapest cost from every state to the full set, (2^n,). `c` is (2^n, n)."""
     full = (1 << n) - 1
@@ -26,18 +64,24 @@ def lowest_to_go(c: Array, n: int) -> Array:
 
 
 @nb.njit(cache=True)
-def range_to_go(g: Array, n: int) -> tuple[Array, Array]:
-    """Smallest and largest total still possible from every state for one quantity g (2^n, n)."""
-    full = (1 << n) - 1
-    low, high = np.zeros(full + 1), np.zeros(full + 1)
-    for s in range(full - 1, -1, -1):
-        lo, hi = np.inf, -np.inf
+def range_to_go(g: Array, start: int, n: int, low: Array, high: Array) -> None:
+    """Fill in the smallest and largest total still possible of P quantities for the states of one block.
+
+    `g` (M, n, P) holds the quantities from the states start, start + 1, ...; `low` and `high` (2^n, P) are complete above
+    the block and zero at the full set.
+    """
+    width, full = g.shape[2], (1 << n) - 1
+    for i in range(g.shape[0] - 1, -1, -1):
+        s = start + i
+        if s == full:
+            continue
+        low[s, :], high[s, :] = np.inf, -np.inf
         for a in range(n):
-            if not (s >> a) & 1:
-                t = s | 1 << a
-                lo, hi = min(lo, g[s, a] + low[t]), max(hi, g[s, a] + high[t])
-        low[s], high[s] = lo, hi
-    return low, high
+            t = s | 1 << a
+            if t != s:
+                for p in range(width):
+                    low[s, p] = min(low[s, p], g[i, a, p] + low[t, p])
+                    high[s, p] = max(high[s, p], g[i, a, p] + high[t, p])
 
 
 @nb.njit(cache=True)
@@ -89,9 +133,7 @@ def distinct_classes(c: Array, n: int, k: int, tolerance: float) -> tuple[Array,
 
 
 @nb.njit(cache=True)
-def members_within(
-    g: Array, n: int, target: Array, low: Array, high: Array, slack: Array, cap: int
-) -> tuple[NDArray[np.int64], bool]:
+def members_within(g: Array, n: int, target: Array, low: Array, high: Array, slack: Array, cap: int) -> tuple[NDArray[np.int64], bool]:
     """Orders whose totals of all P quantities equal `target` within `slack`, lowest ids first, at most `cap` of them.
 
     Depth-first; a prefix is dropped when some remaining total leaves what is still possible. `g` is (2^n, n, P), `low`
@@ -148,7 +190,8 @@ def warm_up() -> None:
     """Compile or load every kernel, so that the first click doesn't wait for it."""
     c = np.ones((4, 2))
     v = lowest_to_go(c, 2)
-    range_to_go(c, 2)
+    range_to_go(c[:, :, None], 0, 2, v[:, None].copy(), v[:, None].copy())
+    box_gaps(np.ones((1, 2), np.bool_), c[:2], c[:2], v, True)
     count_lowest(c, v, 2, 1e-9)
     last_regions(c, v, 2, 1e-9)
     distinct_classes(c, 2, 2, 1e-9)

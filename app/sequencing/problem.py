@@ -22,7 +22,7 @@ from app.sequencing.features import (
 
 TENSOR_LIMIT = 14  # regions: the table of all transitions takes 24 MB for 13 columns
 EXACT_LIMIT = 20  # regions: the table of all costs takes 168 MB
-CHUNK = 4096  # sets evaluated at a time
+CHUNK = 512  # sets evaluated at a time: their features stay in the cache
 
 
 @dataclass(frozen=True, eq=False)

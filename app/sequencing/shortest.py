@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.geometry.tool import Array
 from app.sequencing import kernels
@@ -120,7 +121,7 @@ def _tied(solution: Solution, state: int, a: int) -> bool:
     return after != state and solution.table[state, a] + solution.to_go[after] <= solution.to_go[state] + solution.tolerance
 
 
-def _between(solution: Solution, last: Array, first: int, end: int) -> tuple[int, ...]:
+def _between(solution: Solution, last: NDArray[np.int64], first: int, end: int) -> tuple[int, ...]:
     full = (1 << solution.n) - 1
     order, state = [first], 1 << first
     while state != full:
