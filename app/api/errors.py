@@ -93,9 +93,9 @@ def describe_validation(faults: list[Any]) -> str:
     sentences: list[str] = []
     for fault in faults:
         place = [str(part) for part in fault["loc"]]
-        field = ".".join(place[1:]) or "the request body"
+        field = ".".join(place[1:]) or "The request body"
         if fault["type"] == "json_invalid":
-            field = "the request body"
+            field = "The request body"
         words = KINDS.get(fault["type"]) or f"can't be used: {fault['msg'].removeprefix('Value error, ')}"
         sentences.append(f"{field} {words}.")
     return " ".join(dict.fromkeys(sentences))

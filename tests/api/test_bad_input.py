@@ -25,8 +25,11 @@ DATA;
 #1=CARTESIAN_POINT('',(0.,0.,0.));
 #2=DIRECTION('',(0.,0.,1.
 """
-REAL_TABLE = """Region,Curvature avg,neighbors,neighbor angles,neighbor edges,Shape complexity,Area/total area,Z avg,Z max,Corner Neighbors,region index,Solution
-a,5,"O,x,b,x,c,x,O","x,10,-10,x","0.5,0.5,0.5,0.5",0.7,0.25,0.8,0.9,"O,O,d,O","0,0","a,b,d,c"
+REAL_HEADER = (
+    "Region,Curvature avg,neighbors,neighbor angles,neighbor edges,Shape complexity,Area/total area,Z avg,Z max,"
+    "Corner Neighbors,region index,Solution\n"
+)
+REAL_TABLE = REAL_HEADER + """a,5,"O,x,b,x,c,x,O","x,10,-10,x","0.5,0.5,0.5,0.5",0.7,0.25,0.8,0.9,"O,O,d,O","0,0","a,b,d,c"
 b,6,"O,x,O,x,d,x,a","x,x,-10,-10","0.5,0.5,0.5,0.5",0.7,0.25,0.8,1,"O,O,O,c","0,1",
 c,4,"a,x,d,x,O,x,O","10,10,x,x","0.5,0.5,0.5,0.5",0.7,0.25,0.6,0.7,"O,b,O,O","1,0",
 d,3,"b,x,O,x,O,x,c","10,x,x,-10","0.5,0.5,0.5,0.5",0.7,0.25,0.5,0.6,"a,O,O,O","1,1",

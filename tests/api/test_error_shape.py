@@ -116,7 +116,10 @@ def test_wrong_methods_name_all_the_right_ones(client: TestClient) -> None:
         wrong = next(m for m in ("PUT", "PATCH", "DELETE") if m not in known)
         response = client.request(wrong, path.replace("{region}", "0").replace("{", "").replace("}", ""))
         check_problem(response, 405, "MethodNotAllowed")
-        assert set(response.headers["allow"].split(", ")) - {"HEAD"} == known, path
+        allowed = set(response.headers["allow"].split(", ")) - {"HEAD"}
+        if path.endswith("/projects/sample"):  # also reads as the project called "sample"
+            known |= {"GET", "PATCH", "DELETE"}
+        assert allowed == known, path
 
 
 def test_unknown_addresses_are_404(client: TestClient) -> None:
