@@ -270,7 +270,7 @@ def _closing(state: EffortState, known: list[_Answered]) -> str:
     if not any(a.value in ("left", "right") for a in known):
         return "No order was preferred to another, so effort does not count."
     note = "" if state.complete else " Some tools have more equally good orders than were looked at."
-    return f"{_count(len(known), 'answer')} settle which start and end is less effort.{note}"
+    return f"The start and end of least effort follow from {_count(len(known), 'answer')}.{note}"
 
 
 def _count(number: int, noun: str) -> str:

@@ -17,6 +17,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.errors import EmptySample, InvalidInput
 from app.learning.loss import minimise_loss, performance_gradient, performance_loss
@@ -166,6 +167,7 @@ class _Work:
     parameters: PerformanceParameters
     scale: Array
     floor: Array  # (n + m,)
+    identifiable: NDArray[np.bool_]  # (n + m,)
     demo: Array  # (d, n + m)
     samples: list[Array]  # per demonstration (p_i, n + m)
     taken: list[list[Array]]  # per demonstration, feature sums that were already asked about
@@ -182,8 +184,8 @@ class _Work:
             block = feature_sums(d.problem, state.samples[i] + grown) / scale
             samples.append(block if len(block) else demo[i : i + 1])  # a tool whose orders all tie pulls nowhere
             taken.append([d.problem.feature_sum(q.candidate) / scale for q in own])
-        floor = np.where(state.identifiable, parameters.floor, 0.0)
-        return _Work(demonstrations, parameters, scale, floor, demo, samples, taken)
+        live = np.array(state.identifiable)
+        return _Work(demonstrations, parameters, scale, np.where(live, parameters.floor, 0.0), live, demo, samples, taken)
 
     def cheapest(self, w: Array) -> Array:
         """Feature sums of the cheapest sequences under w, (d, n + m); the demonstration's own where it is one of them."""
@@ -228,6 +230,7 @@ class _Work:
             if attempt and not new:
                 break
             w = minimise_loss(self.demo, self.samples, cuts, self.parameters.terms, self.floor)
+            w = np.where(self.identifiable, w, 0.0)
         return w
 
     def questions(self, state: PerformanceState) -> tuple[SimilarityQuestion, ...]:
