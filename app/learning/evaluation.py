@@ -1,7 +1,7 @@
 """The paper's evaluation on the authors' region tables, without a person: a scripted expert answers the questions.
 
 Paper:
-    Synthetic split as published (train 1, 2, 3, 6, 8, 9; test 4, 5, 7, 10). Which real tools were held out is not published: we train on 1-6
+    Synthetic split as published (train 1, 2, 3, 6, 8, 9; test 4, 5, 7, 10). Which real tools were held out is not: we train on 1-6
         and test on the rest.
     The scripted expert of the synthetic tools weighs all ten features alike, which the paper's project page states; of the real tools'
         expert nothing is known, so only orders with the recorded order's feature sum count as just as good. Both prefer the recorded order
