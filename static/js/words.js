@@ -18,6 +18,9 @@ export function number(value, digits = 3) {
   return value.toLocaleString("en", { minimumFractionDigits: 0, maximumFractionDigits: Math.min(6, decimals) });
 }
 
+// For columns: the same number of decimals in every row.
+export const fixed = (value, decimals = 1) => (Number.isFinite(value) ? value.toFixed(Math.abs(value) >= 1000 ? 0 : decimals).replace(/^-(0(?:\.0+)?)$/, "$1") : "-");
+
 export function timeLeft(seconds) {
   if (seconds === null || seconds === undefined) return "";
   if (seconds < 60) return `${Math.max(1, Math.round(seconds))} s left`;

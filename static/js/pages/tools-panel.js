@@ -5,7 +5,7 @@ import { fill, h } from "../dom.js";
 import { icon } from "../icons.js";
 import { tint } from "../ramp.js";
 import { renameable } from "../rename.js";
-import { number, plural } from "../words.js";
+import { fixed, number, plural } from "../words.js";
 
 const METRES = { mm: 0.001, cm: 0.01, m: 1, in: 0.0254 };
 const UNIT_WORDS = { mm: "Millimetres", cm: "Centimetres", m: "Metres", in: "Inches" };
@@ -36,7 +36,7 @@ export class ToolPanel {
   show(tool, regions, highlight) {
     const key = JSON.stringify([tool.id, tool.state, tool.version, tool.name, tool.segmentation_id, tool.report, tool.error, regions.map((region) => region.name), document.documentElement.dataset.theme]);
     this.tool = tool;
-    if (key !== this.shown && !this.node.querySelector(".rename input, .ask")) this.draw(tool, regions);
+    if (key !== this.shown && !this.node.querySelector(".rename input, .ask-form")) this.draw(tool, regions);
     else if (key !== this.shown && !(tool.state === "asking" && this.asked === tool.id)) this.draw(tool, regions);
     this.shown = key;
     this.asked = tool.state === "asking" ? tool.id : null;
@@ -77,7 +77,7 @@ export class ToolPanel {
         if (error.status === 412) this.reload();
       }
     };
-    return h("div.scroll", {}, h("form.ask", { onsubmit: submit }, units ? this.unitChoices(units) : null, up ? this.upChoices(up) : null, fault, button));
+    return h("div.scroll", {}, h("form.ask-form", { onsubmit: submit }, units ? this.unitChoices(units) : null, up ? this.upChoices(up) : null, fault, button));
   }
 
   unitChoices(units) {
@@ -130,7 +130,7 @@ export class ToolPanel {
     });
     return h("tr", { tabindex: "0", dataset: { region: region.id, key: `region-${region.id}` }, onpointerenter: () => this.onHighlight(region.id), onfocus: () => this.onHighlight(region.id), onclick: () => this.onHighlight(region.id) },
       h("td.nowrap", {}, h("span.swatch.pastel", { style: { "--swatch": tint(region.id) } }), name), h("td.words", { dataset: { tip: region.description } }, region.description),
-      h("td.num", {}, number(region.area_mm2 / 100)), h("td.num", {}, number(region.height)), h("td.num", {}, number(region.curvature_per_m)));
+      h("td.num", {}, fixed(region.area_mm2 / 100)), h("td.num", {}, fixed(region.height, 2)), h("td.num", {}, fixed(region.curvature_per_m)));
   }
 
   mark(region, scroll = false) {

@@ -136,7 +136,7 @@ function toolRow(tool) {
 }
 
 function drawList() {
-  fill(list, state.tools.length ? state.tools.map(toolRow) : null);
+  fill(list, state.tools.map(toolRow));
 }
 
 const COVERS = {
@@ -194,6 +194,7 @@ async function open(id) {
   remember("tool", id);
   await readRegions();
   draw();
+  list.querySelector("[aria-current]")?.scrollIntoView({ block: "nearest" });
 }
 
 async function replaceTool(tool) {
@@ -232,7 +233,7 @@ function openView() {
   return view;
 }
 
-const body = h("div.tools-frame", {}, h("nav.card.fill", { "aria-label": "Tools" }, h("div.card-head", {}, h("h2", {}, "All tools")), h("div.scroll", {}, list, sending),
+const body = h("div.tools-frame", {}, h("nav.card.fill", { "aria-label": "Tools" }, h("div.card-head", {}, h("h2", {}, "All tools")), sending, h("div.scroll", {}, list),
   h("p.drop-note", {}, "Drop CAD files or region tables anywhere on this page.")), stage, panel.node);
 stage.append(caption, cover);
 

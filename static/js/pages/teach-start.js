@@ -1,0 +1,93 @@
+// What can be learned next: cards for the performance and the effort run, with every parameter in a drawer. And the card that
+// says how the last run ended.
+
+import { get, post } from "../api.js";
+import { h } from "../dom.js";
+import { icon } from "../icons.js";
+import { pageAddress } from "../shell.js";
+import { complain } from "../toasts.js";
+import { ago, number, plural } from "../words.js";
+
+function parameterField(entry) {
+  const field = h("input.field", { type: "number", step: "any", value: String(entry.value ?? ""), name: entry.key, "aria-label": entry.label, placeholder: entry.default === null ? "none" : String(entry.default) });
+  return h("label", {}, h("span", {}, h("span.symbol", { dataset: { tip: `${entry.symbol} in the paper, usually ${number(entry.default)}` } }, entry.label)), field);
+}
+
+async function parameterDrawer(projectId, kind) {
+  const { parameters } = await get(`/projects/${encodeURIComponent(projectId)}/run-defaults?kind=${kind}`);
+  const seed = h("label", {}, h("span.symbol", { dataset: { tip: "The same seed and the same answers give the same policy" } }, "Seed of the random draws"), h("input.field", { type: "number", step: "1", min: "0", name: "seed", placeholder: "any" }));
+  const node = h("details.drawer", { style: { width: "100%" } }, h("summary", { style: { padding: "0" } }, icon("right", "caret"), h("h2", {}, "Parameters"), h("span", {}, "usual values")), h("div.params", { style: { padding: "0" } }, parameters.map(parameterField), seed));
+  const words = node.querySelector("summary > span");
+  const values = () => {
+    const params = {};
+    for (const entry of parameters) {
+      const text = node.querySelector(`[name="${entry.key}"]`).value;
+      if (text !== "" && Number(text) !== entry.value) params[entry.key] = Number(text);
+    }
+    return params;
+  };
+  node.addEventListener("input", () => {
+    const count = Object.keys(values()).length;
+    words.textContent = count ? `${plural(count, "value")} changed` : "usual values";
+  });
+  return { node, values, seed: () => (seed.querySelector("input").value === "" ? null : Number(seed.querySelector("input").value)) };
+}
+
+function startButton(projectId, kind, drawer, primary, words, reason, onStarted) {
+  const fault = h("p.error-text", { role: "alert" });
+  const button = h(`button.btn${primary && !reason ? ".primary" : ""}`, { type: "button", dataset: { tip: reason ?? "" }, "aria-disabled": reason ? "true" : null, onclick: async () => {
+    if (reason || button.disabled) return;
+    button.disabled = true;
+    fault.textContent = "";
+    try {
+      const seed = drawer.seed();
+      onStarted(await post(`/projects/${encodeURIComponent(projectId)}/runs`, { kind, params: drawer.values(), ...(seed === null ? {} : { seed }) }));
+    } catch (error) {
+      fault.textContent = error.message;
+    }
+    button.disabled = false;
+  } }, icon("play"), words);
+  return [button, fault];
+}
+
+// The two cards. `learned`: a performance policy exists.
+export async function startCards({ project, runs, onStarted }) {
+  const learned = runs.some((run) => run.kind === "performance" && run.state === "converged");
+  const [performance, effort] = await Promise.all([parameterDrawer(project.id, "performance"), parameterDrawer(project.id, "effort")]);
+  const count = project.counts.demonstrations;
+  const empty = count === 0 ? "Record at least one demonstration first" : null;
+  const before = learned ? null : "Learn what makes an order good first: this decides between orders that are equally good";
+  return h("div.kinds", {},
+    h("section.card.kind", {}, h("h2", {}, "What makes an order good"),
+      h("p", {}, count ? `Learns from ${plural(count, "demonstration")} what an order should cost, and asks you whether other orders would be just as good.` : "Learns from your demonstrations. There is none yet."),
+      startButton(project.id, "performance", performance, !learned, learned ? "Learn again" : "Start learning", empty, onStarted),
+      count ? performance.node : h("a.btn", { href: pageAddress(project.id, "record") }, "Record a demonstration")),
+    h("section.card.kind", {}, h("h2", {}, "Which good order you like better"),
+      h("p", {}, "Some orders are equally good, but one starts or ends where it suits you better. Asks you which of two you prefer."),
+      startButton(project.id, "effort", effort, learned, "Start asking", empty ?? before, onStarted), learned ? effort.node : null));
+}
+
+const OUTCOMES = {
+  converged: (run) => ({ tone: "ok", mark: "shield", title: run.kind === "performance" ? "Learned: every demonstration is explained" : "Learned: your taste is settled", text: `${plural(run.asked, "question")} asked, ${run.answered} answered.` }),
+  stalled: () => ({ tone: "warn", mark: "warn", title: "Nothing is left to ask", text: "Every order that was shown is as good as yours by your own answers. You can take what was learned, or record one more demonstration." }),
+  infeasible: () => ({ tone: "bad", mark: "warn", title: "Some answers or demonstrations contradict each other", text: "No weights can satisfy all of them." }),
+  failed: () => ({ tone: "bad", mark: "warn", title: "The run stopped with an error", text: "It can go on from where it was saved last." }),
+  cancelled: () => ({ tone: "", mark: "stop", title: "The run was stopped", text: "Answers that were given stay in the history." }),
+};
+
+function outcomeActions(run, project, act) {
+  const button = (words, action, primary = false) => h(`button.btn${primary ? ".primary" : ""}`, { type: "button", onclick: () => act(action).catch(complain) }, words);
+  if (run.state === "converged") return [h("a.btn.primary", { href: pageAddress(project.id, "policy") }, "See the policy")];
+  if (run.state === "stalled") return [button("Take what was learned", "finish", true), h("a.btn", { href: pageAddress(project.id, "coverage") }, "What to record next")];
+  if (run.state === "failed") return [button("Go on", "resume", true)];
+  if (run.state === "infeasible") return [h("a.btn", { href: pageAddress(project.id, "record") }, "Look at the demonstrations")];
+  return [];
+}
+
+export function outcomeCard({ run, project, act }) {
+  const outcome = OUTCOMES[run.state]?.(run);
+  if (!outcome) return null;
+  const details = [run.message, typeof run.error === "string" ? run.error : run.error?.detail].filter(Boolean);
+  return h("section.card.outcome", { "aria-label": "How it ended" }, h(`span.chip${outcome.tone ? `.${outcome.tone}` : ""}`, {}, icon(outcome.mark), `${run.kind === "performance" ? "Learning" : "Preferences"}, ${ago(run.updated_at)}`),
+    h("h2", {}, outcome.title), h("p", {}, outcome.text), [...new Set(details)].map((text) => h("p", {}, text)), h("div.actions", {}, outcomeActions(run, project, act)));
+}
