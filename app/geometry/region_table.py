@@ -73,7 +73,7 @@ def read_region_table(text: str, layout: Layout | None = None, file_name: str = 
 
 
 def _border(row: Row, ids: dict[str, int], layout: Layout, odd: list[str]) -> Border:
-    sides = _sides(row, ids)
+    sides = _sides(row, ids, odd)
     count = sum(len(side) for side in sides)
     lengths = row.numbers("lengths")
     if len(lengths) < count or sum(lengths) <= 0:
@@ -89,12 +89,14 @@ def _border(row: Row, ids: dict[str, int], layout: Layout, odd: list[str]) -> Bo
     return Border(sides, tuple(lengths), angles, tuple(b for b in corners if b >= 0))
 
 
-def _sides(row: Row, ids: dict[str, int]) -> tuple[tuple[int, ...], ...]:
+def _sides(row: Row, ids: dict[str, int], odd: list[str]) -> tuple[tuple[int, ...], ...]:
     """'O,x,b,c,x,d,x,O' -> four sides."""
     sides: list[list[int]] = [[]]
     for token in row.items("neighbours"):
         if token.lower() == "x":
             sides.append([])
+        elif not token:
+            odd.append(f"Row {row.letter}: {row.cells['neighbours']!r} in '{row.headers['neighbours']}' has a stray comma; it is left out.")
         else:
             sides[-1].append(_region(row, "neighbours", token, ids))
     if len(sides) != 4 or not all(sides):

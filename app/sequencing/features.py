@@ -236,7 +236,9 @@ def _gaps(graph: RegionGraph, inside: Sets) -> Array:
     tables its width by height. For meshes it is the share of each region's own box that lies in it, times the region's
     area: within the tool's outline, never below the area of S, and the same as the real tables' on a grid.
     """
-    return box_gaps(np.ascontiguousarray(inside), graph.low, graph.high, graph.area, graph.source == "synthetic")
+    # stored arrays may be read-only, which the kernel would be compiled for once more
+    low, high, area = (np.require(x, np.float64, "CW") for x in (graph.low, graph.high, graph.area))
+    return box_gaps(np.require(inside, np.bool_, "CW"), low, high, area, graph.source == "synthetic")
 
 
 _DEFINITIONS: dict[str, Callable[[RegionGraph, Sets], Array]] = {

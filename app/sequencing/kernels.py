@@ -45,7 +45,8 @@ def box_gaps(inside: NDArray[np.bool_], low: Array, high: Array, area: Array, pl
                     elif common < 0:
                         share = 0.0
                 box += share * area[b]
-        out[i] = 1 - own / box
+        if box > 0:  # walls have no area in plan view
+            out[i] = 1 - own / box
     return out
 
 

@@ -1,0 +1,115 @@
+"""The exact search against every order, and the search for large tools against the exact one."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from app.geometry.tool import GraphSource
+from app.sequencing import kernels
+from app.sequencing.comparison import kendall_tau
+from app.sequencing.large import beam, best_found, reorder
+from app.sequencing.problem import problem_for
+from app.sequencing.shortest import TIE_CAP, cost_to_go, shortest_sequence
+from tests.sequencing.graphs import every_order, grid_graph
+
+shapes = st.sampled_from([(1, 1), (1, 3), (2, 2), (1, 5), (2, 3), (1, 7)])
+sources = st.sampled_from(["mesh", "real", "synthetic"])
+
+
+@given(shapes, st.integers(0, 10_000), sources, st.booleans())
+@settings(max_examples=30, deadline=None)
+def test_cheapest_of_every_order(shape: tuple[int, int], seed: int, source: GraphSource, signed: bool):
+    problem = problem_for(grid_graph(*shape, seed, source))
+    w = np.random.default_rng(seed).normal(size=len(problem.columns))
+    w = w if signed else np.abs(w)
+    orders, sums = every_order(problem)
+    cost = sums @ w
+    found = shortest_sequence(problem, w)
+    assert found.proved
+    assert found.cost == pytest.approx(cost.min(), rel=1e-9, abs=1e-9)
+    assert found.cost == problem.cost(w, found.sequence)
+    assert found.sequence in orders
+    assert cost_to_go(problem, w)[0] == pytest.approx(cost.min(), rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("shape", [(2, 3), (1, 6), (1, 7)])
+def test_ties_of_a_symmetric_tool_are_counted_and_the_lowest_ids_win(shape: tuple[int, int]):
+    problem, w = problem_for(grid_graph(*shape, None)), np.ones(13)
+    orders, sums = every_order(problem)
+    cost = sums @ w
+    tied = [o for o, c in zip(orders, cost, strict=True) if c < cost.min() + 1e-9]
+    found = shortest_sequence(problem, w)
+    assert found.ties == len(tied) > 1
+    assert found.sequence == min(tied)
+
+
+def test_tie_break_looks_at_the_whole_class():
+    problem, w = problem_for(grid_graph(2, 3, None)), np.ones(13)
+    orders, sums = every_order(problem)
+    tied = [o for o, c in zip(orders, sums @ w, strict=True) if c < (sums @ w).min() + 1e-9]
+    worst = max(tied)
+    assert shortest_sequence(problem, w, lambda s: float(s != worst)).sequence == worst
+    assert shortest_sequence(problem, w, lambda s: 0.0).sequence == min(tied)
+
+
+def test_tie_break_on_the_ends_is_exact_in_a_huge_class():
+    """With all weights zero every one of 9! orders ties; the penalty wants to start at 7 and end at 2."""
+    problem = problem_for(grid_graph(3, 3, 1))
+    found = shortest_sequence(problem, np.zeros(13), lambda s: float(s[0] != 7) + float(s[-1] != 2))
+    assert found.ties == 362_880 > TIE_CAP
+    assert found.sequence == (7, 0, 1, 3, 4, 5, 6, 8, 2)
+    assert "of 362,880 equal sequences" in found.method
+
+
+def test_twenty_regions_are_proved_and_better_than_any_descent():
+    problem, w = problem_for(grid_graph(4, 5, 3)), np.random.default_rng(0).normal(size=13)
+    exact = shortest_sequence(problem, w)
+    assert exact.proved
+    assert "1,048,576" in exact.method
+    assert exact.cost <= problem.cost(w, best_found(problem, w)) + 1e-9
+
+
+def test_beam_that_holds_every_set_is_exact():
+    problem, w = problem_for(grid_graph(2, 4, 3)), np.random.default_rng(2).normal(size=13)
+    assert problem.cost(w, beam(problem, w, 70)) == pytest.approx(shortest_sequence(problem, w).cost)
+
+
+def test_one_stretch_over_everything_is_exact():
+    problem, w = problem_for(grid_graph(2, 4, 3)), np.random.default_rng(2).normal(size=13)
+    assert problem.cost(w, reorder(problem, w, tuple(range(8)), 0, 8)) == pytest.approx(shortest_sequence(problem, w).cost)
+
+
+def test_reorder_keeps_the_rest_and_never_gets_worse():
+    problem, w = problem_for(grid_graph(2, 4, 9)), np.random.default_rng(4).normal(size=13)
+    order = (3, 1, 4, 0, 5, 7, 2, 6)
+    better = reorder(problem, w, order, 2, 4)
+    assert better[:2] == order[:2]
+    assert better[6:] == order[6:]
+    assert sorted(better) == list(range(8))
+    assert problem.cost(w, better) <= problem.cost(w, order) + 1e-12
+
+
+def test_large_tools_are_not_called_proved():
+    problem, rng = problem_for(grid_graph(4, 6, 3)), np.random.default_rng(0)
+    w = rng.normal(size=13)
+    found = shortest_sequence(problem, w)
+    assert not found.proved
+    assert "Not proved" in found.method
+    assert found.cost == pytest.approx(problem.cost(w, found.sequence))
+    assert found.cost < min(problem.cost(w, rng.permutation(24)) for _ in range(200))
+    assert found == shortest_sequence(problem, w)
+
+
+def test_kendall_tau():
+    assert kendall_tau((0, 1, 2, 3), (0, 1, 2, 3)) == 1
+    assert kendall_tau((0, 1, 2, 3), (3, 2, 1, 0)) == -1
+    assert kendall_tau((2, 0, 1), (0, 2, 1)) == pytest.approx(1 / 3)
+    assert kendall_tau((0,), (0,)) == 1
+
+
+def test_warm_up_compiles_what_a_search_uses():
+    kernels.warm_up()
+    before = {k: len(k.signatures) for k in (kernels.lowest_to_go, kernels.count_lowest, kernels.members_within, kernels.box_gaps)}
+    shortest_sequence(problem_for(grid_graph(2, 3, 1)), np.ones(13), lambda s: 0.0)
+    assert {k: len(k.signatures) for k in before} == before
