@@ -1,0 +1,39 @@
+"""What a view needs of the rest of the application; tests put their own in its place."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from app.geometry.tool import Tool
+from app.robot.playback import Playback
+from app.workflow import record, robot, sessions, tools
+from app.workflow.context import Context
+
+Json = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Actions:
+    """Workflow functions, bound to the running application. All may block and raise AppError."""
+
+    get_session: Callable[[str], Json]
+    get_draft: Callable[[str], Json]
+    tool_value: Callable[[str], Tool]
+    playback_value: Callable[[str], Playback]
+    pick: Callable[[str, int], Any]
+    command: Callable[[str, str], Any]
+    subscribe: Callable[[Callable[[Any], None]], Callable[[], None]]
+
+
+def workflow_actions(ctx: Context) -> Actions:
+    """The real ones."""
+    return Actions(
+        get_session=partial(sessions.get_session, ctx),
+        get_draft=partial(record.get_draft, ctx),
+        tool_value=partial(tools.tool_value, ctx),
+        playback_value=partial(robot.playback_value, ctx),
+        pick=partial(sessions.pick_in_view, ctx),
+        command=partial(sessions.command_in_view, ctx),
+        subscribe=ctx.store.subscribe,
+    )

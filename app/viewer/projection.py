@@ -1,0 +1,70 @@
+"""Where the camera stands for a tool, and where on the canvas a point of it appears."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.geometry.tool import Array, Tool
+
+AZIMUTH, ELEVATION = -0.46, 0.74  # rad; the camera stands to the left in front of the tool and looks down on it
+FIELD_OF_VIEW = 0.56  # rad, vertical
+FILL_HEIGHT, FILL_WIDTH = 0.74, 0.80  # largest share of the half canvas the tool may take
+LEAST_ASPECT = 0.95  # width / height of the narrowest canvas the tool still fills like this
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pose in the tool frame, as viser takes it."""
+
+    position: Array  # (3,) metres
+    look_at: Array  # (3,) metres
+    up: Array  # (3,) unit
+    fov: float  # rad, vertical
+
+    @property
+    def distance(self) -> float:
+        return float(np.linalg.norm(self.look_at - self.position))
+
+
+def camera_for(tool: Tool, also: Array | None = None) -> Camera:
+    """The pose from which the whole tool, and the points `also` (K, 3), fill the view. Depends on nothing else."""
+    points = tool.mesh.vertices if also is None else np.concatenate([tool.mesh.vertices, also])
+    low, high = points.min(0), points.max(0)
+    look_at, up = (low + high) / 2, np.array([0.0, 0.0, 1.0])
+    back = np.array([np.cos(ELEVATION) * np.sin(AZIMUTH), -np.cos(ELEVATION) * np.cos(AZIMUTH), np.sin(ELEVATION)])
+    right, above = _axes(-back, up)
+    offset = points - look_at
+    tall = FILL_HEIGHT * np.tan(FIELD_OF_VIEW / 2)
+    wide = FILL_WIDTH * np.tan(FIELD_OF_VIEW / 2) * LEAST_ASPECT
+    # a point at offset p appears at (p . above) / (distance - p . back): solve for the distance that just fits
+    needed = np.maximum(np.abs(offset @ above) / tall, np.abs(offset @ right) / wide) + offset @ back
+    return Camera(look_at + back * max(float(needed.max()), 1e-6), look_at, up, FIELD_OF_VIEW)
+
+
+def project(points: Array, camera: Camera, width: float, height: float) -> Array:
+    """Pixels (K, 2) of points (K, 3) on a canvas; NaN behind the camera."""
+    forward = (camera.look_at - camera.position) / camera.distance
+    right, above = _axes(forward, camera.up)
+    ray = np.atleast_2d(points) - camera.position
+    depth = ray @ forward
+    scale = np.where(depth > 0, height / 2 / np.tan(camera.fov / 2) / np.where(depth > 0, depth, 1), np.nan)
+    return np.stack([width / 2 + ray @ right * scale, height / 2 - ray @ above * scale], axis=1)
+
+
+def label_points(tool: Tool) -> Array:
+    """A point on the surface of every region (N, 3), in the middle of the face nearest to its centroid."""
+    corners = tool.mesh.vertices[tool.mesh.faces]
+    middles = corners.mean(axis=1)
+    points = np.empty((tool.n, 3))
+    for region in range(tool.n):
+        faces = np.flatnonzero(tool.labels == region)
+        distance = np.linalg.norm(middles[faces] - tool.regions[region].centroid, axis=1)
+        points[region] = middles[faces[np.argmin(distance)]]
+    return points
+
+
+def _axes(forward: Array, up: Array) -> tuple[Array, Array]:
+    """Unit vectors to the right of and above a view direction."""
+    right = np.cross(forward, up)
+    right /= np.linalg.norm(right)
+    return right, np.cross(right, forward)

@@ -1,0 +1,236 @@
+"""One 3D view: the projection of a stored session onto a viser server.
+
+Clicks, hotkeys and changes told by the store only enter a queue; one task per view takes them out, one at a time, and runs the
+workflow and the repainting in a thread. So orders are kept and no two threads paint.
+"""
+
+import asyncio
+import contextlib
+import logging
+import time
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from app.errors import AppError, NotFound
+from app.geometry.tool import Tool
+from app.robot.playback import Playback
+from app.viewer.actions import Actions, Json
+from app.viewer.arm import Arm, order_of, progress_at, room_needed
+from app.viewer.palette import tint_choice
+from app.viewer.picture import Progress, draft_progress, paint, sequence_progress
+from app.viewer.projection import camera_for
+from app.viewer.stage import Stage, open_server
+
+log = logging.getLogger(__name__)
+
+TICK = 1 / 25  # s between poses of a running recording
+HOTKEY_REGIONS = 26
+
+
+@dataclass(frozen=True)
+class Pick:
+    """A click on a region, or its letter."""
+
+    region: int
+
+
+@dataclass(frozen=True)
+class Command:
+    """A hotkey."""
+
+    name: Literal["undo", "redo"]
+
+
+@dataclass(frozen=True)
+class Refresh:
+    """Something stored has changed."""
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Where a recording stands: `time` seconds at the moment `since` of the monotonic clock."""
+
+    playing: bool = False
+    time: float = 0.0
+    speed: float = 1.0
+    since: float = 0.0
+
+    def now(self, cycle: float) -> float:
+        passed = (time.monotonic() - self.since) * self.speed if self.playing else 0.0
+        return min(self.time + passed, cycle)
+
+
+class View:
+    """A viser server, what it shows, and the queue of what is to be done."""
+
+    def __init__(self, sid: str, actions: Actions, loop: asyncio.AbstractEventLoop) -> None:
+        self.sid = sid
+        self.last_seen = time.monotonic()
+        self.stops: set[asyncio.Event] = set()  # one per connected browser; set to end its bridge
+        self._actions = actions
+        self._loop = loop
+        self._queue: asyncio.Queue[Pick | Command | Refresh] = asyncio.Queue()
+        self._scene: Json = {}
+        self._built: tuple[Any, ...] = ()
+        self._tool: Tool | None = None
+        self._playback: Playback | None = None
+        self._arm: Arm | None = None
+        self._clock = Clock()
+        self.server = open_server()
+        self.stage = Stage(self.server, self._clicked)
+        self._add_hotkeys()
+        self._task: asyncio.Task[None] | None = None
+        self._closed = False
+
+    @property
+    def port(self) -> int:
+        return self.server.get_port()
+
+    @property
+    def tool_id(self) -> str | None:
+        return self._scene.get("tool_id")
+
+    # -- from viser's thread and the store's -----------------------------------------------------------------------------
+
+    def submit(self, command: Pick | Command | Refresh) -> None:
+        """Queue a command from any thread."""
+        with contextlib.suppress(RuntimeError):  # the loop has ended: nobody is looking any more
+            self._loop.call_soon_threadsafe(self._queue.put_nowait, command)
+
+    async def _clicked(self, region: int) -> None:
+        self.submit(Pick(region))
+
+    def _add_hotkeys(self) -> None:
+        for label, name, modifier in (("Undo", "undo", "cmd/ctrl"), ("Redo", "redo", "cmd/ctrl+shift")):
+            self.server.gui.add_command(label, hotkey="Z", modifier=modifier).on_trigger(self._triggered(Command(name)))
+        for region in range(HOTKEY_REGIONS):
+            letter = chr(ord("A") + region)
+            self.server.gui.add_command(f"Region {letter}", hotkey=letter).on_trigger(self._triggered(Pick(region)))
+
+    def _triggered(self, command: Pick | Command):  # noqa: ANN202
+        async def triggered(_event: object) -> None:
+            self.submit(command)
+
+        return triggered
+
+    # -- on the application's loop ---------------------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Begin to take commands out of the queue; called on the loop."""
+        self._task = self._loop.create_task(self._consume(), name=f"view {self.sid}")
+
+    async def _consume(self) -> None:
+        while True:
+            command = await self._next()
+            if not self._closed:
+                await asyncio.to_thread(self._guarded, command)
+
+    async def _next(self) -> Pick | Command | Refresh | None:
+        """The next command, or None when a running recording wants its next pose first."""
+        if not (self._clock.playing and self._arm):
+            return await self._queue.get()
+        try:
+            return await asyncio.wait_for(self._queue.get(), TICK)
+        except TimeoutError:
+            return None
+
+    def close(self) -> None:
+        """End the task, the bridges and the server; safe from any thread, twice too."""
+        if self._closed:
+            return
+        self._closed = True
+        with contextlib.suppress(RuntimeError):
+            self._loop.call_soon_threadsafe(self._end)
+        self.server.stop()
+
+    def _end(self) -> None:
+        if self._task is not None:
+            self._task.cancel()
+        for stop in self.stops:
+            stop.set()
+
+    # -- in a worker thread ----------------------------------------------------------------------------------------------
+
+    def _guarded(self, command: Pick | Command | Refresh | None) -> None:
+        """The one place where failures of a view end: people read those meant for them, the rest is logged."""
+        try:
+            self.do(command)
+        except AppError as error:
+            self.notify(str(error))
+        except Exception:  # noqa: BLE001
+            if not self._closed:
+                log.exception("view %s failed on %s", self.sid, command)
+
+    def do(self, command: Pick | Command | Refresh | None) -> None:
+        """Carry out a command; None advances a running recording."""
+        match command:
+            case Pick(region):
+                if self._tool is not None and region < self._tool.n:
+                    self._actions.pick(self.sid, region)
+            case Command(name):
+                if self._scene.get("mode") == "record":
+                    self._actions.command(self.sid, name)
+            case Refresh():
+                self.refresh()
+            case None:
+                self._advance()
+
+    def refresh(self) -> None:
+        """Read the session again and show what it says."""
+        session = self._actions.get_session(self.sid)
+        self._scene = session["scene"]
+        played = session["playback"]
+        self._clock = Clock(played["playing"], played["time"], played["speed"], time.monotonic())
+        self._build()
+        self._advance()
+
+    def _build(self) -> None:
+        """Build the nodes again if the tool, the recording or the theme is another one."""
+        tool_id, playback_id = self._scene.get("tool_id"), self._scene.get("playback_id")
+        mode, dark = self._scene.get("mode", "empty"), bool(self._scene.get("dark"))
+        tool = self._actions.tool_value(tool_id) if tool_id and mode != "empty" else None
+        playback = self._actions.playback_value(playback_id) if playback_id and mode == "robot" else None
+        wanted = (tool_id if tool else None, id(tool.mesh) if tool else None, id(tool.labels) if tool else None, id(playback), dark)
+        moved = wanted[:4] != self._built[:4]
+        self._tool, self._playback = tool, playback
+        if wanted == self._built:
+            return
+        self.stage.build(tool, dark)
+        self._arm = Arm(self.server, playback, dark) if playback is not None else None
+        if tool is not None and moved:
+            self.stage.place_camera(camera_for(tool, room_needed(playback) if playback is not None else None))
+        self._built = wanted
+
+    def _advance(self) -> None:
+        """Paint what the scene says now."""
+        if self._tool is None:
+            return
+        now = 0.0
+        if self._playback is not None and self._arm is not None:
+            now = self._clock.now(self._playback.cycle_s)
+            self._arm.pose(self.server, now)
+            if now >= self._playback.cycle_s:
+                self._clock = Clock(False, now, self._clock.speed)
+        names = [region.name for region in self._tool.regions]
+        picture = paint(self._progress(now), names, tint_choice(self._tool.graph.neighbour), bool(self._scene.get("dark")))
+        if picture != self.stage.shown:
+            self.stage.paint(picture)
+
+    def _progress(self, now: float) -> Progress:
+        scene, highlight = self._scene, self._scene.get("highlight") or ()
+        mode = scene["mode"]
+        if mode == "record":
+            return draft_progress(self._actions.get_draft(scene["tool_id"])["sequence"], highlight)
+        if mode == "robot" and self._playback is not None:
+            return progress_at(self._playback, now)
+        if mode in ("sequence", "robot"):
+            return sequence_progress(scene.get("sequence") or (), scene.get("step"), scene.get("differs") or (), highlight)
+        return Progress(highlight=frozenset(highlight))
+
+    def notify(self, sentence: str) -> None:
+        """Tell everybody who looks."""
+        for client in self.server.get_clients().values():
+            client.add_notification("Not done", sentence, auto_close_seconds=6)
+
+
+__all__ = ["Clock", "Command", "NotFound", "Pick", "Refresh", "View", "order_of"]
