@@ -103,6 +103,7 @@ export class QuestionView {
     const ticks = of <= MOST_TICKS ? h("span.steps", { role: "img", "aria-label": `${answered} answered, ${more + 1} left` }, Array.from({ length: of }, (_, i) => h(`i${i < answered ? ".done" : i === answered ? ".now" : ""}`))) : null;
     fill(this.top, h("div.question", { "aria-live": "polite" }, h("h1#question-title", {}, query.title), h("p.muted", {}, query.difference)),
       h("div.count", {}, h("span.num", {}, `Question ${query.number}${more ? `, ${more} more` : ", the last for now"}`), ticks));
+    this.answers.style.setProperty("--columns", ["1fr", "1fr", ...query.choices.slice(2).map(() => "auto")].join(" "));
     fill(this.answers, query.choices.map((choice) => h(`button.answer${choice.key === "0" || choice.value === "equal" ? ".quiet" : ""}`, { type: "button", dataset: { key: `answer-${choice.value}`, value: choice.value }, onclick: () => this.answer(choice) },
       h("kbd", {}, choice.key), h("span", {}, h("b", {}, choice.label), choice.hint ? h("small", {}, choice.hint) : null))));
     fill(this.below, query.why ? h("p.why", {}, h("b", {}, "Why this one"), query.why) : null, h("span.push"),
