@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.geometry.tool import Array
 from app.sequencing import kernels
@@ -50,22 +51,36 @@ def best_classes(problem: SequencingProblem, w: Array, k: int, tolerance: float 
     if problem.n > EXACT_LIMIT:
         return _classes_nearby(problem, w, k, tolerance)
     solution = solve(problem, w)
-    best, many = kernels.distinct_classes(solution.table, problem.n, k, tolerance * solution.scale)
-    found = [j for j in range(k) if np.isfinite(best[0, j])]
-    orders = [_representative(solution, best, j) for j in found]
-    return tuple(CostClass(problem.cost(w, s), int(many[0, j]), s) for j, s in zip(found, orders, strict=True))
+    merged = Merged(*kernels.distinct_classes(solution.table, solution.to_go, problem.n, k, tolerance * solution.scale))
+    orders = [_representative(solution, merged, j) for j in range(merged.filled[merged.row[0]])]
+    counts = merged.counts[merged.row[0]]
+    return tuple(CostClass(problem.cost(w, s), int(counts[j]), s) for j, s in enumerate(orders))
 
 
-def _representative(solution: Solution, best: Array, which: int) -> tuple[int, ...]:
+@dataclass(frozen=True)
+class Merged:
+    """Distinct totals from each kept set of finished regions to the full set (`kernels.distinct_classes`)."""
+
+    totals: Array  # (S, k)
+    counts: NDArray[np.int64]  # (S, k)
+    filled: NDArray[np.int64]  # (S,)
+    row: NDArray[np.int64]  # (2^N,)
+
+
+def _representative(solution: Solution, merged: Merged, which: int) -> tuple[int, ...]:
     """The sequence that opened class `which`, lowest ids first."""
     order, state = [], 0
     while state != (1 << solution.n) - 1:
-        free = [a for a in range(solution.n) if not state >> a & 1]
-        after = np.array([state | 1 << a for a in free])
-        error = np.abs(solution.table[state, free][:, None] + best[after] - best[state, which])
-        row, which = (int(x) for x in np.argwhere(error <= max(error.min(), 1e-13 * solution.scale))[0])
-        order.append(free[row])
-        state = int(after[row])
+        target = merged.totals[merged.row[state], which]
+        error, a, which = min(
+            (abs(solution.table[state, a] + merged.totals[j, q] - target), a, q)
+            for a in range(solution.n)
+            if not state >> a & 1 and (j := merged.row[state | 1 << a]) >= 0
+            for q in range(merged.filled[j])
+        )
+        assert error <= 1e-12 * solution.scale  # the opener's total was computed from these very numbers
+        order.append(a)
+        state |= 1 << a
     return tuple(order)
 
 

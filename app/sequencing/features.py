@@ -237,8 +237,8 @@ def _gaps(graph: RegionGraph, inside: Sets) -> Array:
     area: within the tool's outline, never below the area of S, and the same as the real tables' on a grid.
     """
     # stored arrays may be read-only, which the kernel would be compiled for once more
-    low, high, area = (np.require(x, np.float64, "CW") for x in (graph.low, graph.high, graph.area))
-    return box_gaps(np.require(inside, np.bool_, "CW"), low, high, area, graph.source == "synthetic")
+    low, high, area = (np.require(x, np.float64, ["C", "W"]) for x in (graph.low, graph.high, graph.area))
+    return box_gaps(np.require(inside, np.bool_, ["C", "W"]), low, high, area, graph.source == "synthetic")
 
 
 _DEFINITIONS: dict[str, Callable[[RegionGraph, Sets], Array]] = {

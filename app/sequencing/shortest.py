@@ -58,8 +58,7 @@ def solve(problem: SequencingProblem, w: Array) -> Solution:
     """
     table = problem.cost_table(w)
     to_go = kernels.lowest_to_go(table, problem.n)
-    bound = float(np.nansum(np.nanmax(np.abs(table[:-1]), axis=0)))
-    return Solution(table, to_go, max(abs(float(to_go[0])), 1e-3 * bound, 1e-300))
+    return Solution(table, to_go, max(abs(float(to_go[0])), 1e-3 * kernels.largest_sum(table, problem.n), 1e-300))
 
 
 def cost_to_go(problem: SequencingProblem, w: Array) -> Array:
