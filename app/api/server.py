@@ -8,7 +8,6 @@ from fastapi.responses import JSONResponse
 
 from app.api.dependencies import Ctx, Row
 from app.api.errors import problem
-from app.workflow import projects as workflow
 
 router = APIRouter(tags=["server"])
 
@@ -39,7 +38,7 @@ def healthz() -> Health:
 @router.get("/readyz", response_model=Readiness, responses={503: {"description": "Not ready."}})
 def readyz(request: Request, ctx: Ctx) -> Readiness | JSONResponse:
     """The database answers and there is room to write."""
-    workflow.list_projects(ctx)
+    ctx.store.read(lambda session: session.connection().exec_driver_sql("SELECT 1").scalar())
     free_mb = shutil.disk_usage(ctx.settings.data).free // 1_000_000
     if free_mb < LEAST_FREE_MB:
         return problem(request, 503, "NotReady", f"Only {free_mb} MB are free on the disk of the data folder.")
