@@ -9,13 +9,11 @@ import numpy as np
 
 from app.geometry.importing import CleaningReport, ImportedPart
 from app.geometry.tool import Mesh, Region, RegionGraph, Tool
-from app.robot.playback import Playback, RegionReport
 
 MEDIA_TYPE = "application/x-npz"
 GRAPH_ARRAYS = tuple(f.name for f in fields(RegionGraph) if f.name != "source")
 REGION_WORDS = ("name", "description", "kind")
 REGION_NUMBERS = ("area", "curvature")
-PLAYBACK_ARRAYS = ("times", "positions", "orientations", "joint_angles", "force_n", "off_path_mm", "region_at")
 
 
 def pack(words: Any, **arrays: np.ndarray) -> bytes:
@@ -71,33 +69,3 @@ def part_from_bytes(content: bytes) -> ImportedPart:
     words, a = unpack(content)
     report = CleaningReport(tuple((level, text) for level, text in words["lines"]))
     return ImportedPart(Mesh(a["vertices"], a["faces"]), a["cad_face"], report)
-
-
-def playback_to_bytes(playback: Playback) -> bytes:
-    """A robot playback as an .npz."""
-    reports = [{f.name: getattr(r, f.name) for f in fields(RegionReport)} for r in playback.region_reports]
-    words = {
-        "bodies": list(playback.bodies),
-        "reports": reports,
-        "cycle_s": float(playback.cycle_s),
-        "in_contact_share": float(playback.in_contact_share),
-    }
-    meshes: dict[str, np.ndarray] = {}
-    for i, (vertices, faces) in enumerate(playback.body_meshes):
-        meshes[f"vertices_{i}"], meshes[f"faces_{i}"] = np.asarray(vertices), np.asarray(faces)
-    return pack(words, **meshes, **{name: np.asarray(getattr(playback, name)) for name in PLAYBACK_ARRAYS})
-
-
-def playback_from_bytes(content: bytes) -> Playback:
-    """The playback that `playback_to_bytes` stored."""
-    words, a = unpack(content)
-    reports = tuple(RegionReport(**{**r, "problems": tuple(tuple(p) for p in r["problems"])}) for r in words["reports"])
-    meshes = tuple((a[f"vertices_{i}"], a[f"faces_{i}"]) for i in range(len(words["bodies"])))
-    return Playback(
-        bodies=tuple(words["bodies"]),
-        body_meshes=meshes,
-        region_reports=reports,
-        cycle_s=words["cycle_s"],
-        in_contact_share=words["in_contact_share"],
-        **{name: a[name] for name in PLAYBACK_ARRAYS},
-    )

@@ -1,0 +1,12 @@
+"""Which kind of background work is done by whom."""
+
+from app.jobs.dispatcher import Jobs
+from app.workflow import import_job
+from app.workflow.values import Values
+
+WARM_UP = ("app.sequencing.warm_up", "app.geometry.regions.warm_up")
+
+
+def register(jobs: Jobs, values: Values) -> None:
+    """Tell the queue how each kind of job is done."""
+    jobs.register(import_job.KIND, import_job.handler(jobs.store))

@@ -1,0 +1,108 @@
+"""Finding rows: what is missing or put away is NotFound, an old version is refused."""
+
+from typing import TypeVar
+
+from sqlmodel import Session, SQLModel, col, func, select
+
+from app.errors import Conflict, NotFound, StaleVersion
+from app.storage.tables import (
+    ACTIVE_RUN_STATES,
+    Demonstration,
+    Project,
+    Query,
+    Run,
+    RunDemonstration,
+    Segmentation,
+    ToolRow,
+)
+
+Row = TypeVar("Row", bound=SQLModel)
+Versioned = TypeVar("Versioned", Project, ToolRow, Demonstration)
+
+
+def found(session: Session, table: type[Row], key: str, noun: str) -> Row:
+    """The row with this id.
+
+    Raises:
+        NotFound: There is none.
+    """
+    row = session.get(table, key)
+    if row is None:
+        raise NotFound(f"There is no {noun} with the id {key!r}.")
+    return row
+
+
+def present(session: Session, table: type[Versioned], key: str) -> Versioned:
+    """Like `found`, for what can be deleted and restored; a tool or demonstration goes with its project."""
+    noun = {"ToolRow": "tool"}.get(table.__name__, table.__name__.lower())
+    row = found(session, table, key, noun)
+    if row.deleted_at is not None:
+        raise NotFound(f"The {noun} {row.name!r} was deleted.")
+    if not isinstance(row, Project):
+        present(session, Project, row.project_id)
+    return row
+
+
+def check_version(row: Project | ToolRow | Demonstration, version: int | None) -> None:
+    """Refuse a change that was made on an older version; None doesn't check."""
+    if version is not None and version != row.version:
+        raise StaleVersion(f"{row.name!r} was changed meanwhile (version {row.version}, not {version}). Look at it again, then repeat the change.")
+
+
+def tools_of(session: Session, project_id: str) -> list[ToolRow]:
+    """Tools that are not deleted, oldest first."""
+    wanted = select(ToolRow).where(ToolRow.project_id == project_id, col(ToolRow.deleted_at).is_(None))
+    return list(session.exec(wanted.order_by(col(ToolRow.id))))
+
+
+def current_segmentation(session: Session, tool_id: str) -> Segmentation | None:
+    """The cut that is shown and trained on."""
+    return session.exec(select(Segmentation).where(Segmentation.tool_id == tool_id, col(Segmentation.current))).first()
+
+
+def ready_segmentation(session: Session, tool: ToolRow) -> Segmentation:
+    """The current cut of a tool.
+
+    Raises:
+        Conflict: The tool is still being read in, or could not be.
+    """
+    row = current_segmentation(session, tool.id)
+    if row is None:
+        waits = "could not be read in" if tool.state == "failed" else "is not read in yet"
+        raise Conflict(f"{tool.name} {waits}, so it has no regions.")
+    return row
+
+
+def standing(session: Session, project_id: str) -> list[Demonstration]:
+    """The demonstrations that count: newest of each tool, on its current cut, nothing deleted; in order of the tools."""
+    wanted = (
+        select(Demonstration)
+        .join(ToolRow, col(ToolRow.id) == col(Demonstration.tool_id))
+        .join(Segmentation, col(Segmentation.id) == col(Demonstration.segmentation_id))
+        .where(
+            Demonstration.project_id == project_id,
+            col(Demonstration.deleted_at).is_(None),
+            col(Demonstration.superseded_by).is_(None),
+            col(ToolRow.deleted_at).is_(None),
+            col(Segmentation.current),
+        )
+    )
+    newest = {row.tool_id: row for row in session.exec(wanted.order_by(col(Demonstration.id)))}
+    return [newest[tool] for tool in sorted(newest)]
+
+
+def active_run(session: Session, project_id: str) -> Run | None:
+    """The run of a project that is not at its end."""
+    wanted = select(Run).where(Run.project_id == project_id, col(Run.state).in_(ACTIVE_RUN_STATES))
+    return session.exec(wanted.order_by(col(Run.id).desc())).first()
+
+
+def run_training_on(session: Session, tool_id: str) -> Run | None:
+    """An active run that uses the tool."""
+    wanted = select(Run).join(RunDemonstration, col(RunDemonstration.run_id) == col(Run.id))
+    return session.exec(wanted.where(RunDemonstration.tool_id == tool_id, col(Run.state).in_(ACTIVE_RUN_STATES))).first()
+
+
+def open_query_count(session: Session, project_id: str) -> int:
+    """Questions that wait for the expert."""
+    return session.exec(select(func.count()).select_from(Query).where(Query.project_id == project_id, Query.state == "open")).one()
