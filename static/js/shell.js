@@ -43,11 +43,19 @@ export function remember(name, value) {
   history.replaceState(null, "", address);
 }
 
+// What fits beside a station: "10", "5/6", "0.76", "3 wait". The full words are its tooltip.
+function shortMeta({ state, meta }) {
+  const text = meta.replace(" of ", "/");
+  if (text.length <= 6) return text;
+  const count = text.match(/^[\d.,/]+/)?.[0] ?? "";
+  return state === "wait" && count ? `${count} wait` : count;
+}
+
 function railLink(stage, project, here) {
   const state = project?.stages.find((entry) => entry.key === stage.key) ?? { state: "todo", meta: "" };
-  return h("a", { href: pageAddress(project?.id ?? projectFromAddress(), stage.page), dataset: { stage: state.state, key: stage.key }, "aria-current": stage.page === here ? "page" : null },
+  return h("a", { href: pageAddress(project?.id ?? projectFromAddress(), stage.page), dataset: { stage: state.state, key: stage.key, tip: state.meta }, "aria-current": stage.page === here ? "page" : null },
     h("span.stop", { "aria-hidden": "true" }), stage.name, h("span.visually-hidden", {}, `, ${STAGE_WORDS[state.state]}`),
-    state.meta ? h(`span.meta${state.state === "wait" ? ".wait" : ""}`, {}, state.meta) : null);
+    h(`span.meta${state.state === "wait" ? ".wait" : ""}`, {}, shortMeta(state)));
 }
 
 export function drawRail(project, here) {
