@@ -8,7 +8,8 @@ from app.geometry.tool import Array, Tool
 
 AZIMUTH, ELEVATION = -0.46, 0.74  # rad; the camera stands to the left in front of the tool and looks down on it
 FIELD_OF_VIEW = 0.56  # rad, vertical
-FILL_HEIGHT, FILL_WIDTH = 0.74, 0.80  # largest share of the half canvas the tool may take
+FILL_HEIGHT, FILL_WIDTH = 0.80, 0.82  # largest share of the canvas the tool may take
+MIDDLE = 0.03  # of the canvas height: how far above its middle the tool stands, because pages have their buttons below
 LEAST_ASPECT = 0.95  # width / height of the narrowest canvas the tool still fills like this
 
 
@@ -29,16 +30,24 @@ class Camera:
 def camera_for(tool: Tool, also: Array | None = None) -> Camera:
     """The pose from which the whole tool, and the points `also` (K, 3), fill the view. Depends on nothing else."""
     points = tool.mesh.vertices if also is None else np.concatenate([tool.mesh.vertices, also])
-    low, high = points.min(0), points.max(0)
-    look_at, up = (low + high) / 2, np.array([0.0, 0.0, 1.0])
-    back = np.array([np.cos(ELEVATION) * np.sin(AZIMUTH), -np.cos(ELEVATION) * np.cos(AZIMUTH), np.sin(ELEVATION)])
+    up, back = np.array([0.0, 0.0, 1.0]), _towards_eye()
     right, above = _axes(-back, up)
-    offset = points - look_at
-    tall = FILL_HEIGHT * np.tan(FIELD_OF_VIEW / 2)
-    wide = FILL_WIDTH * np.tan(FIELD_OF_VIEW / 2) * LEAST_ASPECT
-    # a point at offset p appears at (p . above) / (distance - p . back): solve for the distance that just fits
-    needed = np.maximum(np.abs(offset @ above) / tall, np.abs(offset @ right) / wide) + offset @ back
-    return Camera(look_at + back * max(float(needed.max()), 1e-6), look_at, up, FIELD_OF_VIEW)
+    tall, wide = np.tan(FIELD_OF_VIEW / 2), np.tan(FIELD_OF_VIEW / 2) * LEAST_ASPECT
+    look_at, distance = (points.min(0) + points.max(0)) / 2, 1.0
+    for _ in range(8):  # centre what is seen, then step back until it just fits; each round corrects the other
+        offset = points - look_at
+        # a point p from the middle appears at (p . above) / (distance - p . back)
+        needed = np.maximum(np.abs(offset @ above) / (tall * FILL_HEIGHT), np.abs(offset @ right) / (wide * FILL_WIDTH)) + offset @ back
+        distance = max(float(needed.max()), 1e-6)
+        depth = distance - offset @ back
+        across, upward = offset @ right / depth, offset @ above / depth
+        look_at = look_at + distance * ((across.min() + across.max()) / 2 * right + (upward.min() + upward.max()) / 2 * above)
+    look_at = look_at - 2 * MIDDLE * tall * distance * above
+    return Camera(look_at + back * distance, look_at, up, FIELD_OF_VIEW)
+
+
+def _towards_eye() -> Array:
+    return np.array([np.cos(ELEVATION) * np.sin(AZIMUTH), -np.cos(ELEVATION) * np.cos(AZIMUTH), np.sin(ELEVATION)])
 
 
 def project(points: Array, camera: Camera, width: float, height: float) -> Array:

@@ -4,19 +4,20 @@ from collections.abc import Awaitable, Callable
 
 import numpy as np
 import viser
+from numpy.typing import NDArray
 from viser import _messages  # private, guarded by tests/viewer/test_viser.py
 
 from app.geometry.tool import Array, Tool
 from app.viewer.borders import all_borders, part_of, region_rims, size
-from app.viewer.palette import Rgb, Theme, rgb, theme
+from app.viewer.palette import Rgb, Theme, linear, rgb, theme
 from app.viewer.picture import Picture, RegionLook
 from app.viewer.projection import Camera, label_points
 
 LIGHT_FROM = np.array([-0.45, -0.6, 1.15])  # upper left, in front
 PLATE_SCALE = 1.35  # of viser's 12 px em
 LETTER_HEIGHT = 0.036  # of the part's diagonal
-EDGE_WIDTH, OUTLINE_WIDTH, CASING_WIDTH = 2.0, 5.0, 8.5  # px
-BORDER_LIFT, OUTLINE_LIFT, LABEL_LIFT = 0.002, 0.004, 0.012  # of the part's diagonal
+EDGE_WIDTH, OUTLINE_WIDTH, CASING_WIDTH = 2.0, 4.5, 7.5  # px; shaders.py tells them apart by these
+LIFT, LABEL_LIFT = 0.001, 0.012  # above the surface, of the part's diagonal
 
 PickRegion = Callable[[int], Awaitable[None]]
 
@@ -45,7 +46,7 @@ class Stage:
         self._regions: list[viser.MeshHandle] = []
         self._labels: list[viser.LabelHandle] = []
         self._letters: list[viser.LabelHandle] = []
-        self._rims: tuple[tuple[Array, ...], ...] = ((), ())  # of the casing and, a little higher, of the line
+        self._rims: tuple[Array, ...] = ()
         self._outlines: list[viser.LineSegmentsHandle] = []
 
     def build(self, tool: Tool | None, dark: bool) -> None:
@@ -98,7 +99,7 @@ class Stage:
         x, y = (low[:2] + high[:2]) / 2
         self.server.scene.add_grid(
             "/floor", width=8 * span, height=8 * span, cell_size=span / 7, section_size=span / 7, cell_color=grey, section_color=grey,
-            cell_thickness=1.0, section_thickness=1.0, fade_distance=6 * span, fade_strength=0.8, shadow_opacity=0.0,
+            cell_thickness=0.8, section_thickness=0.0, fade_distance=7 * span, fade_strength=1.0, shadow_opacity=0.0,
             position=(x, y, low[2] - 0.001 * span),
         )  # fmt: skip
 
@@ -112,10 +113,10 @@ class Stage:
             mesh = self._add_mesh(f"/tool/r{region:03d}", vertices, faces, rgb(colours.body))
             mesh.on_click(self._clicked(region))
             self._regions.append(mesh)
-        borders = all_borders(tool, BORDER_LIFT * span)
+        borders = all_borders(tool, LIFT * span)
         if len(borders):
             scene.add_line_segments("/tool/borders", borders, rgb(colours.edge), thickness=EDGE_WIDTH, thickness_units="screen")
-        self._rims = (region_rims(tool, 0.75 * OUTLINE_LIFT * span), region_rims(tool, OUTLINE_LIFT * span))
+        self._rims = region_rims(tool, LIFT * span)
 
     def _add_mesh(self, name: str, vertices: np.ndarray, faces: np.ndarray, colour: Rgb, flat_shading: bool = False) -> viser.MeshHandle:
         return self.server.scene.add_mesh_simple(
@@ -162,11 +163,11 @@ class Stage:
         outlined = [region for region, look in enumerate(picture.regions) if look.outline]
         if not outlined:
             return
-        casing, line = (np.concatenate([rims[region] for region in outlined]) for rims in self._rims)
-        ink = [np.tile(np.array(_outline_colour(picture.regions[r], colours), np.uint8), (len(self._rims[0][r]), 2, 1)) for r in outlined]
-        for name, points, colour, width in (
-            ("/outlines/casing", casing, rgb(colours.surface), CASING_WIDTH),
-            ("/outlines/line", line, np.concatenate(ink), OUTLINE_WIDTH),
+        points = np.concatenate([self._rims[region] for region in outlined])
+        ink = [np.tile(_vertex_colour(_outline_colour(picture.regions[r], colours)), (len(self._rims[r]), 2, 1)) for r in outlined]
+        for name, colour, width in (
+            ("/outlines/casing", rgb(colours.surface), CASING_WIDTH),
+            ("/outlines/line", np.concatenate(ink), OUTLINE_WIDTH),
         ):
             self._outlines.append(scene.add_line_segments(name, points, colour, thickness=width, thickness_units="screen"))
 
@@ -177,3 +178,8 @@ def _outlines(picture: Picture) -> tuple[str | None, ...]:
 
 def _outline_colour(look: RegionLook, colours: Theme) -> Rgb:
     return rgb({"current": colours.current, "differs": colours.differs, "conflict": colours.conflict}[look.outline or "current"])
+
+
+def _vertex_colour(colour: Rgb) -> NDArray[np.uint8]:
+    """Colours given per vertex are taken as linear light, unlike all others."""
+    return np.rint(linear(np.array(colour) / 255) * 255).astype(np.uint8)

@@ -8,14 +8,15 @@ import asyncio
 import contextlib
 import logging
 import time
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from app.errors import AppError, NotFound
+from app.errors import AppError
 from app.geometry.tool import Tool
 from app.robot.playback import Playback
 from app.viewer.actions import Actions, Json
-from app.viewer.arm import Arm, order_of, progress_at, room_needed
+from app.viewer.arm import Arm, progress_at, room_needed
 from app.viewer.palette import tint_choice
 from app.viewer.picture import Progress, draft_progress, paint, sequence_progress
 from app.viewer.projection import camera_for
@@ -107,7 +108,7 @@ class View:
             letter = chr(ord("A") + region)
             self.server.gui.add_command(f"Region {letter}", hotkey=letter).on_trigger(self._triggered(Pick(region)))
 
-    def _triggered(self, command: Pick | Command):  # noqa: ANN202
+    def _triggered(self, command: Pick | Command) -> Callable[[object], Awaitable[None]]:
         async def triggered(_event: object) -> None:
             self.submit(command)
 
@@ -157,7 +158,7 @@ class View:
             self.do(command)
         except AppError as error:
             self.notify(str(error))
-        except Exception:  # noqa: BLE001
+        except Exception:
             if not self._closed:
                 log.exception("view %s failed on %s", self.sid, command)
 
@@ -231,6 +232,3 @@ class View:
         """Tell everybody who looks."""
         for client in self.server.get_clients().values():
             client.add_notification("Not done", sentence, auto_close_seconds=6)
-
-
-__all__ = ["Clock", "Command", "NotFound", "Pick", "Refresh", "View", "order_of"]
