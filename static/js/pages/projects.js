@@ -1,6 +1,6 @@
 // All projects: the one thing to do next, the list with its progress, what runs right now.
 
-import { all, patch, post, remove } from "../api.js";
+import { all, get, patch, post, remove } from "../api.js";
 import { fill, h } from "../dom.js";
 import { connect, gathered, listen } from "../events.js";
 import { icon } from "../icons.js";
@@ -8,6 +8,7 @@ import { bind } from "../keys.js";
 import { menuButton } from "../menu.js";
 import { STAGES, STAGE_WORDS, boot, drawRail, pageAddress, showFault, statusOf } from "../shell.js";
 import { complain, toast } from "../toasts.js";
+import { drawTool } from "../thumbnail.js";
 import { View3D } from "../view3d.js";
 import { ago, plural, sentence, spoken, timeLeft } from "../words.js";
 
@@ -24,7 +25,8 @@ const body = h("div.project-grid", {}, table, aside);
 fill(shell.main, head, form, hero, body);
 
 let projects = null;
-let leaving = new Set(); // deleted here, still within their time to be taken back
+const leaving = new Set(); // deleted here, still within their time to be taken back
+const pictures = new Map();
 let view = null;
 let heroFor = "";
 
@@ -147,19 +149,37 @@ async function rename(project) {
   field.querySelector("button").click();
 }
 
+// One canvas per project, kept while the table is drawn anew: its first tool, coloured where somebody has demonstrated it.
+function picture(project) {
+  if (!pictures.has(project.id)) {
+    const canvas = h("canvas.mini", { "aria-hidden": "true" });
+    pictures.set(project.id, canvas);
+    showPicture(project, canvas).catch(complain);
+  }
+  return pictures.get(project.id);
+}
+
+async function showPicture(project, canvas) {
+  const tools = (await get(`/projects/${encodeURIComponent(project.id)}/tools`)).items.filter((tool) => tool.state === "ready");
+  const tool = tools.find((entry) => entry.demonstrated) ?? tools[0];
+  if (!tool) return;
+  const shown = tool.demonstration_id ? await get(`/demonstrations/${encodeURIComponent(tool.demonstration_id)}`) : null;
+  await drawTool(canvas, tool.id, { sequence: shown?.sequence });
+}
+
 function row(project) {
   const next = nextOf(project);
   const counts = `${plural(project.counts.tools, "tool")}, ${project.counts.demonstrations ? plural(project.counts.demonstrations, "demonstration") : "nothing recorded"}`;
   const status = statusOf(project);
   const nextCell = project.counts.open_queries ? h("span.chip.signal", {}, plural(project.counts.open_queries, "question")) : status.state === "running" ? status.text : next.title;
-  return h("tr", {}, h("th", { scope: "row", class: "name" }, h("span", { dataset: { project: project.id } }, h("a", { href: next.href, dataset: { key: `open-${project.id}` } }, project.name)), h("br"), h("span.small.muted", {}, counts)),
+  return h("tr", {}, h("td.picture", {}, picture(project)), h("th", { scope: "row", class: "name" }, h("span", { dataset: { project: project.id } }, h("a", { href: next.href, dataset: { key: `open-${project.id}` } }, project.name)), h("br"), h("span.small.muted", {}, counts)),
     h("td", {}, stations(project)), h("td.muted", {}, nextCell), h("td.num.muted", {}, ago(project.updated_at)),
     h("td.row-actions", {}, menuButton("", () => [{ label: "Rename", run: () => rename(project) }, { label: "Delete", run: () => deleteSoon(project) }], "button.icon-btn", { name: `More about ${project.name}` })));
 }
 
 function drawTable(list) {
   table.hidden = list.length === 0;
-  fill(table, h("table.projects", {}, h("thead", {}, h("tr", {}, h("th", {}, "Project"), h("th", {}, "Progress"), h("th", {}, "Next"), h("th.num", {}, "Last change"), h("th", {}, h("span.visually-hidden", {}, "More")))),
+  fill(table, h("table.projects", {}, h("thead", {}, h("tr", {}, h("th", {}, h("span.visually-hidden", {}, "Picture")), h("th", {}, "Project"), h("th", {}, "Progress"), h("th", {}, "Next"), h("th.num", {}, "Last change"), h("th", {}, h("span.visually-hidden", {}, "More")))),
     h("tbody", {}, list.map(row))));
 }
 

@@ -226,7 +226,8 @@ function paintTabs() {
 function row(id, index) {
   const { draft, replay } = state;
   const times = draft.click_times ?? [];
-  const gap = index && Number.isFinite(times[index]) ? `+${(times[index] - times[index - 1]).toFixed(1)} s` : "";
+  const waited = index ? times[index] - times[index - 1] : NaN;
+  const gap = waited > 0 ? `+${waited.toFixed(1)} s` : ""; // a row that was moved says nothing about time
   const current = replay && !replay.title ? replay.step - 1 : draft.sequence.length - 1;
   const ahead = replay && !replay.title && index >= replay.step;
   return h(`li${ahead ? ".ahead" : ""}`, { draggable: "true", tabindex: "0", "aria-current": index === current ? "step" : null, dataset: { key: `row-${id}` }, "aria-label": `${index + 1}: ${region(id).name}, ${region(id).description}. Alt with arrows moves it` },
