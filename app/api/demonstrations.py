@@ -6,7 +6,7 @@ from fastapi import APIRouter, Response
 
 from app.api.dependencies import Body, Ctx, Json, Name, Paging, RegionOrder, Row, Version, located, page, tagged
 from app.api.idempotency import ActionRoute, IdempotencyKey
-from app.workflow import record as workflow
+from app.workflow import demonstrations as workflow
 
 router = APIRouter(tags=["demonstrations"], route_class=ActionRoute)
 
