@@ -125,7 +125,7 @@ def performance_step(
     if state.phase == "questions":
         recent = state.asked[len(state.asked) - state.latest :]
         if recent and all(answers[q.fingerprint] == "similar" for q in recent):
-            return _result(state, (), "stalled", "Every order shown was just as good as the recorded one: nothing is left to learn from.")
+            return _stalled(_Work.of(demonstrations, parameters, state, answers), state)
         state = replace(state, phase="training", step=0, round=state.round + 1, latest=0)
     work = _Work.of(demonstrations, parameters, state, answers)
     metrics: list[Metric] = []
@@ -154,14 +154,25 @@ def _close_round(work: "_Work", state: PerformanceState, metrics: tuple[Metric, 
     state = state.with_weights(work.finish(state.w))
     left = work.violated(state.w)
     if not left:
-        state = replace(state, phase="converged")
-        exact = work.gaps(state.w, work.cheapest(state.w)).max() <= TIED
-        close = "the best one" if exact else f"within {parameters.tolerance:.2%} of the best one"
-        text = f"Every recorded order is {close} on its tool, after {_count(state.iteration, 'step')}."
-        return _result(state, metrics, "converged", text)
+        return _converged(work, state, metrics)
     state = replace(state, phase="infeasible")
     worst = "; ".join(f"demonstration {i + 1} costs {gap:.1%} more than the best order" for i, gap in left)
     return _result(state, metrics, "infeasible", f"No weights were found that explain all demonstrations: {worst}.")
+
+
+def _stalled(work: "_Work", state: PerformanceState) -> StepResult:
+    """Every order shown was called similar, so no sample grows; the exact minimiser may still explain all demonstrations."""
+    finished = state.with_weights(work.finish(state.w))
+    if not work.violated(finished.w):
+        return _converged(work, finished, ())
+    return _result(finished, (), "stalled", "Every order shown was just as good as the recorded one: nothing is left to learn from.")
+
+
+def _converged(work: "_Work", state: PerformanceState, metrics: tuple[Metric, ...]) -> StepResult:
+    exact = work.gaps(state.w, work.cheapest(state.w)).max() <= TIED
+    close = "the best one" if exact else f"within {work.parameters.tolerance:.2%} of the best one"
+    text = f"Every recorded order is {close} on its tool, after {_count(state.iteration, 'step')}."
+    return _result(replace(state, phase="converged"), metrics, "converged", text)
 
 
 @dataclass(frozen=True)

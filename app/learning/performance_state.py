@@ -27,12 +27,12 @@ class PerformanceParameters:
     zeta: float = 0.9
     regularisation: float = 1.0
     learning_rate: float = 0.004
-    iterations: int = 10
+    iterations: int = 5
     samples: int = 30
     classes: int = 3
     tolerance: float = 1e-3
     floor: float = 0.1
-    rounds: int = 12
+    rounds: int = 20
 
     @property
     def terms(self) -> LossTerms:
