@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from tests.api.files import REAL_TABLE, tetrahedron
 from tests.api.problems import check_problem
 
 UNKNOWN = "00000000-0000-7000-8000-000000000000"
@@ -29,7 +30,7 @@ BODIES: dict[str, dict[str, Any]] = {
     "show": {"mode": "empty"},
     "control_playback": {"action": "pause"},
 }
-UPLOADS = {"upload_tool", "import_region_table"}
+UPLOADS = {"upload_tool": ("x.stl", tetrahedron()), "import_region_table": ("x.csv", REAL_TABLE.encode())}
 WITHOUT_IDS = {"list_projects", "create_project", "create_sample_project", "healthz", "readyz"}
 
 
@@ -51,7 +52,7 @@ def request_of(method: str, path: str, operation: dict[str, Any]) -> dict[str, A
     if "kind" in needed:
         request["params"] = {"kind": "performance"}
     if operation["operationId"] in UPLOADS:
-        request["files"] = {"file": ("x.stl", b"solid x\nendsolid x\n")}
+        request["files"] = {"file": UPLOADS[operation["operationId"]]}
     elif operation["operationId"] in BODIES:
         request["json"] = BODIES[operation["operationId"]]
     if operation["operationId"] == "stream_events":
