@@ -90,7 +90,7 @@ function paint(canvas, list, colourOf) {
   const memory = new Map();
   pen.lineWidth = 0.6;
   pen.lineJoin = "round";
-  for (const { region, lit, xy } of flat.sort((a, b) => a.depth - b.depth)) {
+  for (const { region, lit, xy } of flat.filter((face) => face.region >= 0 || face.facing > 0).sort((a, b) => a.depth - b.depth)) {
     pen.fillStyle = pen.strokeStyle = shade(colourOf(region), lit, memory);
     pen.beginPath();
     xy.forEach(([x, y], k) => pen[k ? "lineTo" : "moveTo"](width / 2 + x * scale, height / 2 - y * scale));

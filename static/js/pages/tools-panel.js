@@ -23,6 +23,12 @@ function upWords(direction) {
   return direction[0] === "+" ? `${axis} up` : `${axis} down`;
 }
 
+// The whole text on hover, but only where the column cuts it.
+function tipWhenCut({ currentTarget: cell }) {
+  if (cell.scrollWidth > cell.clientWidth) cell.dataset.tip = cell.textContent;
+  else delete cell.dataset.tip;
+}
+
 export class ToolPanel {
   constructor({ onHighlight, onChanged, onDelete, reload }) {
     this.onHighlight = onHighlight;
@@ -129,7 +135,7 @@ export class ToolPanel {
       this.reload();
     });
     return h("tr", { tabindex: "0", dataset: { region: region.id, key: `region-${region.id}` }, onpointerenter: () => this.onHighlight(region.id), onfocus: () => this.onHighlight(region.id), onclick: () => this.onHighlight(region.id) },
-      h("td.nowrap", {}, h("span.swatch.pastel", { style: { "--swatch": tint(region.id) } }), name), h("td.words", { dataset: { tip: region.description } }, region.description),
+      h("td.nowrap", {}, h("span.swatch.pastel", { style: { "--swatch": tint(region.id) } }), name), h("td.words", { onpointerenter: tipWhenCut }, region.description),
       h("td.num", {}, fixed(region.area_mm2 / 100)), h("td.num", {}, fixed(region.height, 2)), h("td.num", {}, fixed(region.curvature_per_m)));
   }
 
