@@ -1,9 +1,9 @@
 """Alembic's entry: runs migrations on the connection it is given, or on the default data folder's database."""
 
-from alembic import context
 from sqlalchemy import create_engine
 from sqlmodel import SQLModel
 
+from alembic import context
 from app.settings import Settings
 from app.storage import tables
 

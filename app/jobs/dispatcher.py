@@ -37,6 +37,7 @@ class Handler:
     compute: Compute  # importable and pure: (arguments, report) -> output
     finish: Callable[[Session, JobRow, Any], None]
     fail: Callable[[Session, JobRow, dict[str, str]], None]  # tell the subject
+    begin: Callable[[Session, JobRow], None] = lambda _session, _job: None  # tell the subject that work starts
 
 
 class Jobs:
@@ -105,7 +106,7 @@ class Jobs:
         while len(self._running) < self._runner.slots and not self._closing and not self._broken:
             if not self.store.read(_next_queued):  # spares a commit
                 return
-            job = self.store.write(_claim)
+            job = self.store.write(lambda session: _claim(session, self._handlers))
             if job is not None:
                 self._start(job)
 
@@ -181,12 +182,14 @@ def _next_queued(session: Session) -> JobRow | None:
     return session.exec(select(JobRow).where(JobRow.state == "queued").order_by(col(JobRow.id)).limit(1)).first()
 
 
-def _claim(session: Session) -> JobRow | None:
+def _claim(session: Session, handlers: dict[str, Handler]) -> JobRow | None:
     """Take the oldest queued job; the row is returned detached."""
     row = _next_queued(session)
     if row is not None:
         row.state, row.attempt, row.started_at = "running", row.attempt + 1, now()
         session.add(row)
+        if row.kind in handlers:
+            handlers[row.kind].begin(session, row)
         tell(session, row)
     return row
 

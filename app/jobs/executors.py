@@ -110,5 +110,3 @@ class Processes:
             except queue.Empty:
                 continue
             self._progress(ticket, fraction, message)
-
-

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 
-from alembic import command
 from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
@@ -14,6 +13,7 @@ from alembic.util import CommandError
 from sqlalchemy import create_engine
 from sqlalchemy.pool import NullPool
 
+from alembic import command
 from app.errors import Conflict
 from app.settings import ROOT, Settings
 
@@ -57,7 +57,9 @@ def _check_known(scripts: ScriptDirectory, revision: str, database: Path) -> Non
     try:
         scripts.get_revision(revision)
     except CommandError:
-        message = f"{database} was written by a newer version of Apprentice (revision {revision}). Use that version, or another data folder."
+        message = (
+            f"{database} was written by a newer version of Apprentice (revision {revision}). Use that version, or another data folder."
+        )
         raise Conflict(message) from None
 
 

@@ -200,6 +200,7 @@ class RunCheckpoint(SQLModel, table=True):
     outcome: str
     state: Json = json_column()
     weights: list[float] = json_column()
+    identifiable: list[bool] = json_column()
     created_at: str = Field(default_factory=now)
 
 

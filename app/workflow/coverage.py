@@ -5,16 +5,16 @@ from typing import Any
 from sqlmodel import Session
 
 from app.errors import InvalidInput, UnknownFeature
-from app.learning.coverage import RULE, Cell, CoverageReport, InteractionTable, coverage
+from app.learning.coverage import RULE, Cell, CoverageReport, InteractionTable
 from app.sequencing.features import interaction_label
 from app.storage import emit
 from app.storage.tables import Project, Segmentation, ToolRow
 from app.workflow.context import Context
-from app.workflow.lookup import current_segmentation, present, standing, tools_of
-from app.workflow.values import interactions_from
+from app.workflow.lookup import present, standing
+from app.workflow.project_rows import project_features, project_json, touch
+from app.workflow.reports import report_of
 
 Json = dict[str, Any]
-Pick = tuple[str, tuple[int, ...]]  # tool id, sequence
 
 
 def get_coverage(ctx: Context, project_id: str) -> Json:
@@ -22,37 +22,10 @@ def get_coverage(ctx: Context, project_id: str) -> Json:
 
     def query(session: Session) -> Json:
         project = present(session, Project, project_id)
-        tools, report = report_of(ctx, session, project, ())
+        tools, report = report_of(ctx.values, session, project, ())
         return coverage_json(ctx, session, project, tools, report)
 
     return ctx.store.read(query)
-
-
-def rho(ctx: Context, session: Session, project: Project) -> float | None:
-    """Captured share of the possible situations, None without a demonstration."""
-    report = report_of(ctx, session, project, ())[1]
-    return None if report is None else report.rho
-
-
-def report_of(ctx: Context, session: Session, project: Project, extra: tuple[Pick, ...]) -> tuple[list[ToolRow], CoverageReport | None]:
-    """The report on the standing demonstrations, with `extra` ones in place of those of their tools."""
-    picks: dict[str, tuple[int, ...]] = {d.tool_id: tuple(d.sequence) for d in standing(session, project.id)}
-    picks.update(extra)
-    cuts = {t.id: cut for t in tools_of(session, project.id) if (cut := current_segmentation(session, t.id))}
-    known = [t for t in tools_of(session, project.id) if t.id in cuts]
-    first = next((t for t in known if t.id in picks), None)
-    if first is None:
-        return [], None
-    tools = [t for t in known if cuts[t.id].feature_set == cuts[first.id].feature_set]
-    interactions = interactions_from(project.interactions)
-    shown = tuple((i, picks[t.id]) for i, t in enumerate(tools) if t.id in picks)
-    key = (tuple(cuts[t.id].id for t in tools), shown, interactions)
-
-    def make() -> CoverageReport:
-        problems = [ctx.values.problem(session, cuts[t.id], interactions) for t in tools]
-        return coverage(problems, list(shown), interactions)
-
-    return tools, ctx.values.reports.get(key, make)
 
 
 def set_interactions(ctx: Context, project_id: str, interactions: list[dict[str, str]]) -> Json:
@@ -62,7 +35,6 @@ def set_interactions(ctx: Context, project_id: str, interactions: list[dict[str,
         InvalidInput: One is named twice, or pairs a factor with itself.
         UnknownFeature: A factor that the project's features don't have.
     """
-    from app.workflow.projects import get_project, project_features, touch
 
     def change(session: Session) -> None:
         project = present(session, Project, project_id)
@@ -83,7 +55,7 @@ def set_interactions(ctx: Context, project_id: str, interactions: list[dict[str,
         emit(session, "coverage.changed", project_id)
 
     ctx.store.write(change)
-    return get_project(ctx, project_id)
+    return ctx.store.read(lambda session: project_json(ctx.values, session, present(session, Project, project_id)))
 
 
 NOTHING: Json = {"rho": None, "captured": 0, "possible": 0, "demonstrations": 0, "steps": 0, "rule": RULE, "tables": [], "requests": []}

@@ -11,7 +11,7 @@ from app.storage.identity import now
 from app.storage.tables import ACTIVE_RUN_STATES, Demonstration, Project, Run, RunDemonstration, Segmentation, ToolRow
 from app.workflow.context import Context
 from app.workflow.lookup import check_version, found, present, ready_segmentation
-from app.workflow.projects import checked_name
+from app.workflow.project_rows import checked_name
 
 Json = dict[str, Any]
 

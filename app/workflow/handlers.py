@@ -1,7 +1,7 @@
 """Which kind of background work is done by whom."""
 
 from app.jobs.dispatcher import Jobs
-from app.workflow import import_job
+from app.workflow import import_job, playback_job, training_job
 from app.workflow.values import Values
 
 WARM_UP = ("app.sequencing.warm_up", "app.geometry.regions.warm_up")
@@ -10,3 +10,5 @@ WARM_UP = ("app.sequencing.warm_up", "app.geometry.regions.warm_up")
 def register(jobs: Jobs, values: Values) -> None:
     """Tell the queue how each kind of job is done."""
     jobs.register(import_job.KIND, import_job.handler(jobs.store))
+    jobs.register(training_job.KIND, training_job.handler(values))
+    jobs.register(playback_job.KIND, playback_job.handler(jobs.store, values))

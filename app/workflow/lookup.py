@@ -4,7 +4,7 @@ from typing import TypeVar
 
 from sqlmodel import Session, SQLModel, col, func, select
 
-from app.errors import Conflict, NotFound, StaleVersion
+from app.errors import Conflict, NotFound, RunActive, StaleVersion
 from app.storage.tables import (
     ACTIVE_RUN_STATES,
     Demonstration,
@@ -46,7 +46,9 @@ def present(session: Session, table: type[Versioned], key: str) -> Versioned:
 def check_version(row: Project | ToolRow | Demonstration, version: int | None) -> None:
     """Refuse a change that was made on an older version; None doesn't check."""
     if version is not None and version != row.version:
-        raise StaleVersion(f"{row.name!r} was changed meanwhile (version {row.version}, not {version}). Look at it again, then repeat the change.")
+        raise StaleVersion(
+            f"{row.name!r} was changed meanwhile (version {row.version}, not {version}). Look at it again, then repeat the change."
+        )
 
 
 def tools_of(session: Session, project_id: str) -> list[ToolRow]:
@@ -106,3 +108,25 @@ def run_training_on(session: Session, tool_id: str) -> Run | None:
 def open_query_count(session: Session, project_id: str) -> int:
     """Questions that wait for the expert."""
     return session.exec(select(func.count()).select_from(Query).where(Query.project_id == project_id, Query.state == "open")).one()
+
+
+def refuse_while_training(session: Session, project: Project) -> None:
+    """One run per project at a time.
+
+    Raises:
+        RunActive: There is one.
+    """
+    if active_run(session, project.id):
+        raise RunActive(f"A run of {project.name} is not at its end. Answer its questions, or stop it first.")
+
+
+def check_tools(session: Session, run: Run) -> None:
+    """A run can only go on while its tools are there.
+
+    Raises:
+        Conflict: One was deleted.
+    """
+    gone = select(ToolRow.name).join(RunDemonstration, col(RunDemonstration.tool_id) == col(ToolRow.id))
+    name = session.exec(gone.where(RunDemonstration.run_id == run.id, col(ToolRow.deleted_at).is_not(None))).first()
+    if name is not None:
+        raise Conflict(f"{name}, which this run learned from, was deleted. Restore it, or start a new run.")

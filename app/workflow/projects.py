@@ -1,20 +1,15 @@
-"""Projects: listing, renaming, putting away, and how far each is."""
+"""Projects: listing, making, renaming, putting away."""
 
 from typing import Any
 
-from sqlmodel import Session, col, func, select
+from sqlmodel import Session, col, select
 
-from app.errors import InvalidInput
-from app.jobs.rows import running_jobs
-from app.sequencing.features import DEFAULT_INTERACTIONS, FACTOR_WORDS, FEATURE_SETS, FeatureSet, Interaction, interaction_label
-from app.storage import emit
 from app.storage.identity import now
-from app.storage.tables import Demonstration, Project, Segmentation, ToolRow
+from app.storage.tables import Project
 from app.workflow.context import Context
-from app.workflow.coverage import rho
-from app.workflow.lookup import check_version, open_query_count, present, standing, tools_of
+from app.workflow.lookup import check_version, present, refuse_while_training
+from app.workflow.project_rows import add_project, checked_name, project_json, touch
 from app.workflow.sample import create_sample
-from app.workflow.stages import Progress, next_step, stages
 
 Json = dict[str, Any]
 
@@ -24,7 +19,7 @@ def list_projects(ctx: Context) -> list[Json]:
 
     def query(session: Session) -> list[Json]:
         rows = session.exec(select(Project).where(col(Project.deleted_at).is_(None)).order_by(col(Project.id)))
-        return [project_json(ctx, session, row) for row in rows.all()]
+        return [project_json(ctx.values, session, row) for row in rows.all()]
 
     return ctx.store.read(query)
 
@@ -42,18 +37,9 @@ def create_sample_project(ctx: Context) -> Json:
     return get_project(ctx, row)
 
 
-def add_project(session: Session, name: str, process: str, *, sample: bool = False) -> Project:
-    """The row of a new project."""
-    row = Project(name=checked_name(name), process=process, sample=sample, interactions=stored(DEFAULT_INTERACTIONS))
-    session.add(row)
-    session.flush()
-    emit(session, "project.changed", row.id)
-    return row
-
-
 def get_project(ctx: Context, project_id: str) -> Json:
     """One project."""
-    return ctx.store.read(lambda session: project_json(ctx, session, present(session, Project, project_id)))
+    return ctx.store.read(lambda session: project_json(ctx.values, session, present(session, Project, project_id)))
 
 
 def update_project(ctx: Context, project_id: str, changes: Json, version: int | None = None) -> Json:
@@ -72,7 +58,6 @@ def update_project(ctx: Context, project_id: str, changes: Json, version: int | 
 
 def delete_project(ctx: Context, project_id: str, version: int | None = None) -> None:
     """Put the project away; refused while something trains in it."""
-    from app.workflow.runs import refuse_while_training
 
     def change(session: Session) -> None:
         row = present(session, Project, project_id)
@@ -82,82 +67,3 @@ def delete_project(ctx: Context, project_id: str, version: int | None = None) ->
         touch(session, row)
 
     ctx.store.write(change)
-
-
-def touch(session: Session, row: Project) -> None:
-    """Count a change and tell of it."""
-    row.version, row.updated_at = row.version + 1, now()
-    session.add(row)
-    emit(session, "project.changed", row.id)
-
-
-def checked_name(name: str) -> str:
-    """A name as stored.
-
-    Raises:
-        InvalidInput: Empty, or longer than 120 characters.
-    """
-    name = name.strip()
-    if not 1 <= len(name) <= 120:
-        raise InvalidInput("A name has 1 to 120 characters.")
-    return name
-
-
-def stored(interactions: tuple[Interaction, ...]) -> list[dict[str, str]]:
-    """Interactions as a JSON column holds them."""
-    return [{"first": i.first, "second": i.second} for i in interactions]
-
-
-def project_features(session: Session, project_id: str) -> FeatureSet:
-    """The feature set of the demonstrated tools, else of the oldest tool, else the one for meshes."""
-    demonstrated = standing(session, project_id)
-    wanted = select(Segmentation).join(ToolRow, col(ToolRow.id) == col(Segmentation.tool_id)).where(col(Segmentation.current))
-    wanted = wanted.where(ToolRow.project_id == project_id, col(ToolRow.deleted_at).is_(None)).order_by(col(ToolRow.id))
-    row = session.get(Segmentation, demonstrated[0].segmentation_id) if demonstrated else session.exec(wanted.limit(1)).first()
-    return FEATURE_SETS[row.feature_set if row else "clean"]
-
-
-def labelled(interactions: list[dict[str, str]], features: FeatureSet) -> list[Json]:
-    """Interactions with words."""
-    return [{**i, "label": interaction_label(Interaction(i["first"], i["second"]), features)} for i in interactions]
-
-
-def interaction_choices(features: FeatureSet) -> list[Json]:
-    """All pairs of factors that have plain names."""
-    keys = [key for key in FACTOR_WORDS if key in features.factors]
-    pairs = [{"first": a, "second": b} for k, a in enumerate(keys) for b in keys[k + 1 :]]
-    usual = stored(DEFAULT_INTERACTIONS)
-    return labelled(usual + [p for p in pairs if p not in usual and {"first": p["second"], "second": p["first"]} not in usual], features)
-
-
-def project_json(ctx: Context, session: Session, row: Project) -> Json:
-    """The project as REST shows it."""
-    features = project_features(session, row.id)
-    progress = Progress.of(session, row.id, rho(ctx, session, row))
-    demonstrations = select(func.count()).select_from(Demonstration).join(ToolRow, col(ToolRow.id) == col(Demonstration.tool_id))
-    demonstrations = demonstrations.where(
-        Demonstration.project_id == row.id,
-        col(Demonstration.deleted_at).is_(None),
-        col(Demonstration.superseded_by).is_(None),
-        col(ToolRow.deleted_at).is_(None),
-    )
-    return {
-        "id": row.id,
-        "name": row.name,
-        "process": row.process,
-        "sample": row.sample,
-        "interactions": labelled(row.interactions, features),
-        "interaction_choices": interaction_choices(features),
-        "version": row.version,
-        "created_at": row.created_at,
-        "updated_at": row.updated_at,
-        "counts": {
-            "tools": len(tools_of(session, row.id)),
-            "demonstrations": session.exec(demonstrations).one(),
-            "open_queries": open_query_count(session, row.id),
-        },
-        "rho": progress.rho,
-        "stages": stages(progress),
-        "next_step": next_step(progress),
-        "running": running_jobs(session, row.id),
-    }

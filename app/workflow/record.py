@@ -5,12 +5,11 @@ from typing import Any
 
 from sqlmodel import Session
 
-from app.errors import IncompleteSequence, InvalidInput
+from app.errors import IncompleteSequence
 from app.storage import emit
 from app.storage.identity import now
 from app.storage.tables import Draft, Project, Segmentation, ToolRow
 from app.workflow.context import Context
-from app.workflow.coverage import report_of
 from app.workflow.demonstrations import (
     add_demonstration,
     create_demonstration,
@@ -22,6 +21,7 @@ from app.workflow.demonstrations import (
     update_demonstration,
 )
 from app.workflow.lookup import present, ready_segmentation
+from app.workflow.reports import report_of
 from app.workflow.tools import check_region
 
 __all__ = [
@@ -60,14 +60,15 @@ def pick(ctx: Context, tool_id: str, region: int) -> Json:
     """Put a region at the end of the draft.
 
     Raises:
-        InvalidInput: No such region, or it has its number already.
+        InvalidInput: No such region.
+        IncompleteSequence: The region has its number already.
     """
 
     def step(session: Session, row: ToolRow, cut: Segmentation, draft: Draft) -> None:
         check_region(row, cut, region)
         if region in draft.sequence:
             name = ctx.values.tool(session, cut).regions[region].name
-            raise InvalidInput(f"{name} is number {draft.sequence.index(region) + 1} already. Undo, or move it in the list.")
+            raise IncompleteSequence(f"{name} is number {draft.sequence.index(region) + 1} already. Undo, or move it in the list.")
         _set(draft, [*draft.sequence, region], [*draft.click_times, _seconds()])
 
     return _change(ctx, tool_id, step)
@@ -81,7 +82,9 @@ def place(ctx: Context, tool_id: str, sequence: list[int]) -> Json:
             check_region(row, cut, region)
         twice = [a for a in sequence if sequence.count(a) > 1]
         if twice:
-            raise InvalidInput(f"{ctx.values.tool(session, cut).regions[twice[0]].name} is in the order twice; every region comes once.")
+            raise IncompleteSequence(
+                f"{ctx.values.tool(session, cut).regions[twice[0]].name} is in the order twice; every region comes once."
+            )
         known = dict(zip(draft.sequence, draft.click_times, strict=True))
         _set(draft, list(sequence), [known.get(a, _seconds()) for a in sequence])
 
@@ -135,7 +138,9 @@ def save(ctx: Context, tool_id: str, name: str | None = None) -> Json:
         draft = _draft(session, cut)
         missing = [r.name for a, r in enumerate(ctx.values.tool(session, cut).regions) if a not in draft.sequence]
         if missing:
-            raise IncompleteSequence(f"{', '.join(missing)} {'has' if len(missing) == 1 else 'have'} no number yet; an order holds every region once.")
+            raise IncompleteSequence(
+                f"{', '.join(missing)} {'has' if len(missing) == 1 else 'have'} no number yet; an order holds every region once."
+            )
         shown = add_demonstration(session, row, cut, draft.sequence, "recorded", name=name, click_times=_relative(draft.click_times))
         if draft in session:
             session.delete(draft)
@@ -162,8 +167,8 @@ def draft_json(ctx: Context, session: Session, row: ToolRow, cut: Segmentation, 
 def _gain(ctx: Context, session: Session, row: ToolRow, draft: Draft) -> Json:
     """What saving the draft does to rho."""
     project = present(session, Project, row.project_id)
-    standing_report = report_of(ctx, session, project, ())[1]
-    report = report_of(ctx, session, project, ((row.id, tuple(draft.sequence)),))[1]
+    standing_report = report_of(ctx.values, session, project, ())[1]
+    report = report_of(ctx.values, session, project, ((row.id, tuple(draft.sequence)),))[1]
     before = standing_report.rho if standing_report else 0.0
     after = report.rho if report else 0.0
     covered = f"{report.captured if report else 0} of {report.possible if report else 0} situations covered"

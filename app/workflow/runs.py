@@ -1,4 +1,195 @@
-from app.errors import RunActive
-from app.workflow.lookup import active_run
-def refuse_while_training(session, row):
-    if active_run(session, row.id): raise RunActive("x")
+"""Runs: starting a learner, following it, stopping it, taking it up again. Questions and answers are in `queries`."""
+
+from typing import Any
+
+from sqlmodel import Session, col, select
+
+from app.errors import Conflict, InvalidInput
+from app.jobs.rows import cancel_jobs
+from app.storage.tables import (
+    ACTIVE_RUN_STATES,
+    Demonstration,
+    Metric,
+    PolicyRow,
+    Project,
+    Run,
+    RunDemonstration,
+    Segmentation,
+)
+from app.workflow.context import Context
+from app.workflow.lookup import check_tools, found, present, refuse_while_training, standing
+from app.workflow.queries import answer, get_query, list_queries, undo_answer
+from app.workflow.run_rows import (
+    PARAMETERS,
+    checkpoint_of,
+    go,
+    open_queries,
+    parameter_rows,
+    parameters_for,
+    run_json,
+    train_on,
+    withdraw,
+    write_policy,
+)
+
+__all__ = [
+    "answer",
+    "cancel",
+    "finish_run",
+    "get_query",
+    "get_run",
+    "list_queries",
+    "list_runs",
+    "metrics",
+    "resume",
+    "run_defaults",
+    "start_run",
+    "undo_answer",
+]
+
+Json = dict[str, Any]
+
+DEFAULT_SEED = 1
+
+
+def run_defaults(ctx: Context, project_id: str, kind: str) -> Json:
+    """The hyperparameters a new run would have."""
+    _check_kind(kind)
+    ctx.store.read(lambda session: present(session, Project, project_id).id)
+    return {"parameters": parameter_rows(kind, {})}
+
+
+def start_run(ctx: Context, project_id: str, kind: str, params: Json | None = None, seed: int | None = None) -> Json:
+    """Start a learner on the demonstrations that count now.
+
+    Raises:
+        InvalidInput: Nothing to learn from, or an effort run without a policy to build on.
+        RunActive: Another run of the project is not at its end.
+    """
+    _check_kind(kind)
+    parameters_for(kind, params or {})
+
+    def change(session: Session) -> Json:
+        project = present(session, Project, project_id)
+        refuse_while_training(session, project)
+        base = _latest_policy(session, project_id) if kind == "effort" else None
+        shown = _demonstrations(session, project_id, base)
+        row = Run(
+            project_id=project_id,
+            kind=kind,
+            seed=DEFAULT_SEED if seed is None else seed,
+            params=params or {},
+            interactions=base.interactions if base else project.interactions,
+            based_on=base.id if base else None,
+        )
+        session.add(row)
+        session.flush()
+        for position, demonstration in enumerate(shown):
+            session.add(
+                RunDemonstration(run_id=row.id, position=position, demonstration_id=demonstration.id, tool_id=demonstration.tool_id)
+            )
+        train_on(session, row, "Waiting to start.")
+        return run_json(session, row)
+
+    return ctx.store.write(change)
+
+
+def list_runs(ctx: Context, project_id: str) -> list[Json]:
+    """The runs of a project, newest first."""
+
+    def query(session: Session) -> list[Json]:
+        present(session, Project, project_id)
+        rows = session.exec(select(Run).where(Run.project_id == project_id).order_by(col(Run.id).desc())).all()
+        return [run_json(session, row) for row in rows]
+
+    return ctx.store.read(query)
+
+
+def get_run(ctx: Context, run_id: str) -> Json:
+    """One run."""
+    return ctx.store.read(lambda session: run_json(session, found(session, Run, run_id, "run")))
+
+
+def metrics(ctx: Context, run_id: str, after: int = 0) -> list[Json]:
+    """The learning curve behind an iteration."""
+
+    def query(session: Session) -> list[Json]:
+        found(session, Run, run_id, "run")
+        wanted = select(Metric).where(Metric.run_id == run_id, col(Metric.iteration) > after).order_by(col(Metric.iteration))
+        return [{"iteration": m.iteration, "loss": m.loss, "terms": m.terms, "violations": m.violations} for m in session.exec(wanted)]
+
+    return ctx.store.read(query)
+
+
+def cancel(ctx: Context, run_id: str) -> Json:
+    """Stop a run; its open questions are withdrawn."""
+
+    def change(session: Session) -> Json:
+        row = found(session, Run, run_id, "run")
+        if row.state not in ACTIVE_RUN_STATES:
+            raise Conflict(f"This run is at its end ({row.state}); there is nothing to stop.")
+        cancel_jobs(session, row.id)
+        for query in open_queries(session, row.id):
+            withdraw(session, query)
+        go(session, row, "cancelled", "Stopped. It can go on from where it was.")
+        return run_json(session, row)
+
+    return ctx.store.write(change)
+
+
+def resume(ctx: Context, run_id: str) -> Json:
+    """Go on from the last checkpoint of a failed or stopped run."""
+
+    def change(session: Session) -> Json:
+        row = found(session, Run, run_id, "run")
+        if row.state not in ("failed", "cancelled"):
+            raise Conflict(f"Only a failed or stopped run can go on; this one is {row.state.replace('_', ' ')}.")
+        refuse_while_training(session, found(session, Project, row.project_id, "project"))
+        check_tools(session, row)
+        train_on(session, row, "Going on.")
+        return run_json(session, row)
+
+    return ctx.store.write(change)
+
+
+def finish_run(ctx: Context, run_id: str) -> Json:
+    """Take what a stalled run has learned: all it could still ask about was called just as good.
+
+    An infeasible run's weights can be taken too, as a compromise; the policy says that it did not converge.
+    """
+
+    def change(session: Session) -> Json:
+        row = found(session, Run, run_id, "run")
+        checkpoint = checkpoint_of(session, row)
+        if row.state not in ("stalled", "infeasible") or checkpoint is None:
+            raise Conflict(f"Only a run that found nothing left to learn can be finished; this one is {row.state.replace('_', ' ')}.")
+        write_policy(session, row, checkpoint.weights, checkpoint.identifiable, converged=False)
+        row.error = None
+        go(session, row, "converged", "Finished with what was learned so far.")
+        return run_json(session, row)
+
+    return ctx.store.write(change)
+
+
+def _check_kind(kind: str) -> None:
+    if kind not in PARAMETERS:
+        raise InvalidInput(f"A run learns {' or '.join(PARAMETERS)}, not {kind!r}.")
+
+
+def _latest_policy(session: Session, project_id: str) -> PolicyRow:
+    row = session.exec(select(PolicyRow).where(PolicyRow.project_id == project_id).order_by(col(PolicyRow.id).desc())).first()
+    if row is None:
+        raise InvalidInput(
+            "Effort settles ties between orders that are equally good, so what is good comes first: teach your order, then compare."
+        )
+    return row
+
+
+def _demonstrations(session: Session, project_id: str, base: PolicyRow | None) -> list[Demonstration]:
+    """The standing demonstrations that share one feature set."""
+    shown = [(d, found(session, Segmentation, d.segmentation_id, "segmentation").feature_set) for d in standing(session, project_id)]
+    wanted = base.feature_set if base else next((features for _, features in shown), None)
+    kept = [d for d, features in shown if features == wanted]
+    if not kept:
+        raise InvalidInput("There is no recorded order to learn from. Record one first.")
+    return kept

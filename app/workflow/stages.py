@@ -151,7 +151,9 @@ def _tool_step(p: Progress) -> Json | None:
         first = p.questions[0]
         name = p.tool_name(first.tool_id)
         same = all(q.tool_id == first.tool_id for q in p.questions)
-        title = f"{count(len(p.questions), 'question')} about {name}" if same else f"{count(len(p.questions), 'question')} about your orders"
+        title = (
+            f"{count(len(p.questions), 'question')} about {name}" if same else f"{count(len(p.questions), 'question')} about your orders"
+        )
         text = "Learning goes on by itself as soon as the last one is answered."
         return _step(title, text, "Answer the questions" if len(p.questions) > 1 else "Answer the question", "teach", first.tool_id)
     if not p.ready:
@@ -196,7 +198,9 @@ def _use_step(p: Progress) -> Json:
     name = p.tool_name(plan.tool_id)
     shown = [b for b in p.playbacks if b.plan_id == plan.id and b.state != "failed"]
     if not shown:
-        return _step(f"Watch the robot do {name}", "Reach, collisions and force are checked on the way.", "Watch the robot", "robot", plan.tool_id)
+        return _step(
+            f"Watch the robot do {name}", "Reach, collisions and force are checked on the way.", "Watch the robot", "robot", plan.tool_id
+        )
     flawed = flawed_regions(shown[-1])
     if flawed:
         text = f"The robot can't work on {'it' if flawed == 1 else 'them'} as planned."

@@ -58,7 +58,9 @@ def touch_tool(session: Session, row: ToolRow) -> None:
     emit(session, "tool.changed", row.project_id, tool_id=row.id)
 
 
-def add_cut(session: Session, store: Store, row: ToolRow, content: bytes, region_count: int, feature_set: str, params: Json) -> Segmentation:
+def add_cut(
+    session: Session, store: Store, row: ToolRow, content: bytes, region_count: int, feature_set: str, params: Json
+) -> Segmentation:
     """Make `content` (a Tool value) the current cut of the tool; earlier ones stay for what refers to them."""
     before = current_segmentation(session, row.id)
     if before is not None:

@@ -23,7 +23,7 @@ from app.storage.tables import Demonstration, Project, RegionName, Segmentation,
 from app.workflow import import_job
 from app.workflow.context import Context
 from app.workflow.lookup import check_version, found, present, ready_segmentation, run_training_on, tools_of
-from app.workflow.projects import checked_name
+from app.workflow.project_rows import checked_name
 from app.workflow.tool_rows import add_cut, tool_json, touch_tool
 
 Json = dict[str, Any]
@@ -127,7 +127,9 @@ def import_region_table(ctx: Context, project_id: str, text: str, file_name: str
     def change(session: Session) -> Json:
         present(session, Project, project_id)
         report = [{"level": "repaired", "text": fault} for fault in table.faults]
-        row = ToolRow(project_id=project_id, name=checked_name(Path(file_name).stem), kind="table", state="ready", file_name=file_name, report=report)
+        row = ToolRow(
+            project_id=project_id, name=checked_name(Path(file_name).stem), kind="table", state="ready", file_name=file_name, report=report
+        )
         session.add(row)
         session.flush()
         cut = add_cut(session, ctx.store, row, content, table.tool.n, feature_set_for(table.tool.graph).name, {"layout": table.layout})
@@ -135,7 +137,13 @@ def import_region_table(ctx: Context, project_id: str, text: str, file_name: str
         if table.expert is not None:
             sequence = [int(a) for a in table.expert]
             shown = Demonstration(
-                project_id=project_id, tool_id=row.id, segmentation_id=cut.id, name=row.name, sequence=sequence, source="table", author="Expert"
+                project_id=project_id,
+                tool_id=row.id,
+                segmentation_id=cut.id,
+                name=row.name,
+                sequence=sequence,
+                source="table",
+                author="Expert",
             )
             session.add(shown)
             session.flush()
@@ -267,7 +275,14 @@ def _next(session: Session, row: ToolRow, params: Json) -> Json:
         row.state, row.questions = "importing", None
         session.add(row)
         session.flush()
-        add_job(session, import_job.KIND, row.project_id, row.id, f"Reading {row.name}" if row.part_sha is None else f"Cutting {row.name}", params)
+        add_job(
+            session,
+            import_job.KIND,
+            row.project_id,
+            row.id,
+            f"Reading {row.name}" if row.part_sha is None else f"Cutting {row.name}",
+            params,
+        )
     elif row.questions is not None:
         row.questions = {
             "units": row.questions["units"] if row.units is None else None,

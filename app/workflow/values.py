@@ -48,9 +48,7 @@ class Values:
     def tool(self, session: Session, segmentation: Segmentation) -> Tool:
         """The tool with the names people gave its regions."""
         tool: Tool = self._tools.get(segmentation.id, lambda: tool_from_bytes(self._store.artifacts.get(segmentation.tool_sha)))
-        given = {
-            row.region: row.name for row in session.exec(select(RegionName).where(RegionName.segmentation_id == segmentation.id))
-        }
+        given = {row.region: row.name for row in session.exec(select(RegionName).where(RegionName.segmentation_id == segmentation.id))}
         if not given:
             return tool
         return replace(tool, regions=tuple(replace(r, name=given.get(i, r.name)) for i, r in enumerate(tool.regions)))

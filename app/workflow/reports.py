@@ -1,0 +1,37 @@
+"""Coverage reports of a project, kept in memory by what they depend on."""
+
+from sqlmodel import Session
+
+from app.learning.coverage import CoverageReport, coverage
+from app.storage.tables import Project, ToolRow
+from app.workflow.lookup import current_segmentation, standing, tools_of
+from app.workflow.values import Values, interactions_from
+
+Pick = tuple[str, tuple[int, ...]]  # tool id, sequence
+
+
+def rho(values: Values, session: Session, project: Project) -> float | None:
+    """Captured share of the possible situations, None without a demonstration."""
+    report = report_of(values, session, project, ())[1]
+    return None if report is None else report.rho
+
+
+def report_of(values: Values, session: Session, project: Project, extra: tuple[Pick, ...]) -> tuple[list[ToolRow], CoverageReport | None]:
+    """The report on the standing demonstrations, with `extra` ones in place of those of their tools."""
+    picks: dict[str, tuple[int, ...]] = {d.tool_id: tuple(d.sequence) for d in standing(session, project.id)}
+    picks.update(extra)
+    cuts = {t.id: cut for t in tools_of(session, project.id) if (cut := current_segmentation(session, t.id))}
+    known = [t for t in tools_of(session, project.id) if t.id in cuts]
+    first = next((t for t in known if t.id in picks), None)
+    if first is None:
+        return [], None
+    tools = [t for t in known if cuts[t.id].feature_set == cuts[first.id].feature_set]
+    interactions = interactions_from(project.interactions)
+    shown = tuple((i, picks[t.id]) for i, t in enumerate(tools) if t.id in picks)
+    key = (tuple(cuts[t.id].id for t in tools), shown, interactions)
+
+    def make() -> CoverageReport:
+        problems = [values.problem(session, cuts[t.id], interactions) for t in tools]
+        return coverage(problems, list(shown), interactions)
+
+    return tools, values.reports.get(key, make)
