@@ -6,7 +6,7 @@ from fastapi import APIRouter, Query, Response
 
 from app.api.dependencies import Body, Ctx, Json, Paging, Row, page
 from app.api.idempotency import ActionRoute, IdempotencyKey
-from app.workflow import runs as workflow
+from app.workflow import queries as workflow
 
 router = APIRouter(tags=["queries"], route_class=ActionRoute)
 
