@@ -31,8 +31,10 @@ def off_path(commands: Commands, trace: Trace) -> Array:
     return np.linalg.norm(miss - normal * np.einsum("ki,ki->k", miss, normal)[:, None], axis=1)
 
 
-def planning_problems(tool: Tool, plan: RegionPlan, placement: Placement, roller: RollerSize, cloud: Cloud) -> list[Problem]:
-    """Reach, joint limits, singular poses and collisions of one region."""
+def planning_problems(
+    tool: Tool, plan: RegionPlan, before: Array | None, placement: Placement, roller: RollerSize, cloud: Cloud
+) -> list[Problem]:
+    """Reach, joint limits, singular poses and collisions of one region; `before` are the joint angles the arm comes from."""
     name = tool.regions[plan.region].name
     problems = _reach_problems(name, plan)
     if not plan.passes:
@@ -43,9 +45,13 @@ def planning_problems(tool: Tool, plan: RegionPlan, placement: Placement, roller
     if weakest < NEAR_SINGULAR:
         bent = "wrist 2 nearly straight" if np.abs(np.sin(q[:, 4])).min() < 0.15 else "the arm nearly stretched out"
         problems.append(("singular", f"Region {name} is worked with {bent}: close to a singular pose, where joints turn fast."))
-    touch = deepest_touch(q[:: max(1, len(q) // POSES_CHECKED)], placement, cloud)
-    if touch is not None:
-        problems.append(("collision", _collision_sentence(tool, name, plan.region, touch)))
+    poses = {"while working": q[:: max(1, len(q) // POSES_CHECKED)]}
+    if before is not None:
+        poses["on the way to"] = before + (q[0] - before) * np.linspace(0, 1, 12)[:, None]
+    for when, posed in poses.items():
+        touch = deepest_touch(posed, placement, cloud)
+        if touch is not None:
+            problems.append(("collision", _collision_sentence(tool, touch, f"{when} region {name}")))
     return problems
 
 
@@ -61,45 +67,48 @@ def _reach_problems(name: str, plan: RegionPlan) -> list[Problem]:
         far = f"{100 * plan.farthest_miss_m:.0f} cm" if plan.farthest_miss_m >= 0.01 else "1 cm"
         return [("reach", f"Region {name} is out of reach by {far}{part}.")]
     if plan.largest_tilt_rad > np.radians(0.5):
-        return [("reach", f"Region {name} can't be worked with the roller upright on the surface{part}: {np.degrees(plan.largest_tilt_rad):.0f} degrees short.")]
+        short = f"{np.degrees(plan.largest_tilt_rad):.0f} degrees short"
+        return [("reach", f"Region {name} can't be worked with the roller upright on the surface{part}: {short}.")]
     return [("reach", f"Region {name} leaves no room to approach it{part}.")]
 
 
 def _limit_problems(name: str, q: Array) -> list[Problem]:
     """Joints that come near the end of their range."""
     margin = (arm.LIMIT - np.abs(q)).min(axis=0)
-    return [
-        ("limit", f"Region {name}: {arm.JOINTS[j]} comes within {max(1, int(np.ceil(np.degrees(margin[j]))))} degree{'s' * (margin[j] > np.radians(1))} of its limit.")
-        for j in np.flatnonzero(margin < NEAR_LIMIT)
-    ]  # fmt: skip
+    problems = []
+    for j in np.flatnonzero(margin < NEAR_LIMIT):
+        degrees = max(1, int(np.ceil(np.degrees(margin[j]))))
+        amount = "1 degree" if degrees == 1 else f"{degrees} degrees"
+        problems.append(("limit", f"Region {name}: {arm.JOINTS[j]} comes within {amount} of its limit."))
+    return problems
 
 
-def _collision_sentence(tool: Tool, name: str, region: int, touch: Touch) -> str:
+def _collision_sentence(tool: Tool, touch: Touch, when: str) -> str:
     """Which link would touch what, and how deep."""
-    depth = f"by {1000 * touch.depth:.0f} mm"
+    link = touch.body.capitalize() if touch.body.startswith("wrist") else f"The {touch.body}"
     if isinstance(touch.other, str):
-        return f"The {touch.body} would touch the {touch.other} {depth} while working region {name}."
+        return f"{link} would touch the {touch.other} {when}, by {1000 * touch.depth:.0f} mm."
     other = "the part" if touch.other < 0 else f"region {tool.regions[touch.other].name}"
-    return f"The {touch.body} would touch {'it' if touch.other == region else other} {depth} while working region {name}."
+    return f"{link} would touch {other} {when}, by {1000 * touch.depth:.0f} mm."
 
 
 def region_report(
-    tool: Tool, plan: RegionPlan, samples: Samples, roller: RollerSize, commands: Commands, trace: Trace, problems: list[Problem], after: float
+    name: str, plan: RegionPlan, samples: Samples, roller: RollerSize, commands: Commands, trace: Trace, found: list[Problem], after: float
 ) -> RegionReport:
     """Measured numbers of one region; `after` is the time the one before it ended, used where nothing was done."""
     mine = commands.region == plan.region
     if not mine.any():
-        return RegionReport(plan.region, after, after, 0.0, 0.0, 0.0, 0.0, tuple(problems))
+        return RegionReport(plan.region, after, after, 0.0, 0.0, 0.0, 0.0, tuple(found))
     when = np.flatnonzero(mine) * DT
     touching, sweeping = mine & (commands.phase != FREE), mine & (commands.phase == SWEEPING)
     error = trace.force[sweeping] - commands.wanted[sweeping]
     covered = coverage(samples, *_pressed(commands, trace, touching), roller.width)
-    name = tool.regions[plan.region].name
-    lost = float((trace.force[sweeping] < LOST_N).mean())
+    problems, lost = list(found), float((trace.force[sweeping] < LOST_N).mean())
     if lost > LOST_SHARE:
-        problems = [*problems, ("contact", f"The roller loses contact on {round(100 * lost)} % of region {name}.")]
+        problems.append(("contact", f"The roller loses contact on {round(100 * lost)} % of region {name}."))
     if covered < COVERED_ENOUGH and plan.reached == plan.planned:
-        problems = [*problems, ("coverage", f"Only {100 * covered:.0f} % of region {name} is covered: it is narrow or strongly curved for the roller.")]
+        why = "it is narrow or strongly curved for the roller"
+        problems.append(("coverage", f"Only {100 * covered:.0f} % of region {name} is covered: {why}."))
     return RegionReport(
         plan.region, float(when[0]), float(when[-1] + DT), float(np.sqrt((error**2).mean())), float(trace.force[touching].max()),
         float(1000 * off_path(commands, trace)[touching].max()), covered, tuple(problems),

@@ -79,7 +79,8 @@ def _add_arm(spec: mujoco.MjSpec, placement: Placement) -> mujoco.MjsBody:
         position, angle = arm.mounting(i)
         body = body.add_body(name=name, pos=list(position), quat=[np.cos(angle / 2), np.sin(angle / 2), 0, 0])
         joint = body.add_joint(name=arm.JOINTS[i], type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 0, 1])
-        joint.range, joint.limited, joint.armature, joint.damping = [-arm.LIMIT[i], arm.LIMIT[i]], 1, 0.1, [JOINT_DAMPING[i], 0, 0]  # linear, then polynomial terms
+        joint.range, joint.limited, joint.armature = [-arm.LIMIT[i], arm.LIMIT[i]], 1, 0.1
+        joint.damping = [JOINT_DAMPING[i], 0, 0]  # linear, then polynomial terms
         capsules = [c for c in arm.CAPSULES if c.body == name]
         for c in capsules:
             body.add_geom(type=mujoco.mjtGeom.mjGEOM_CAPSULE, fromto=[*c.start, *c.end], size=[c.radius, 0, 0],
@@ -127,11 +128,6 @@ def _capsule(start: Array, end: Array, radius: float) -> trimesh.Trimesh:
     mesh.apply_transform(trimesh.geometry.align_vectors([0, 0, 1], end - start))
     mesh.apply_translation((start + end) / 2 - mesh.bounds.mean(axis=0))
     return mesh
-
-
-def mesh_triangles(meshes: tuple[tuple[Floats, Faces], ...]) -> int:
-    """Triangles to draw in total."""
-    return sum(len(faces) for _, faces in meshes)
 
 
 def servo_numbers(model: mujoco.MjModel) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

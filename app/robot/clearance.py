@@ -10,8 +10,8 @@ from app.robot import arm
 from app.robot.cell import STEM, Placement
 from app.robot.raster import Patch, draw_samples, patch_of
 
-NEAR_TIP = ("wrist 3",)  # works close to the surface by design: only real overlap counts
-STEM_RADIUS = 0.02  # m
+STEM_RADIUS, STEM_FREE = 0.014, 0.035  # m; the last part of the stem belongs to the roller, which is meant to touch
+SLIGHT = 0.002  # m of overlap that is within the accuracy of the points
 SELF_PAIRS = (("wrist 2", "upper arm"), ("wrist 3", "upper arm"), ("wrist 1", "shoulder"), ("wrist 2", "shoulder"), ("wrist 3", "shoulder"))
 POSES_AT_ONCE = 40
 
@@ -54,10 +54,10 @@ def _thinned(patch: Patch, width: float) -> Array:
 def _segments(q: Array, placement: Placement) -> list[tuple[str, Array, Array, float]]:
     """Each capsule as (body, start (P, 3), end (P, 3), radius) in the tool frame."""
     frames = arm.forward(q)
-    stem = arm.Capsule("wrist 3", (0, 0, 0.09), (0, 0, arm.D[5] + STEM), STEM_RADIUS)
+    stem = arm.Capsule("roller's stem", (0, 0, 0.09), (0, 0, arm.D[5] + STEM - STEM_FREE), STEM_RADIUS)
     result = []
     for c in (*arm.CAPSULES, stem):
-        i = arm.LINKS.index(c.body)
+        i = arm.LINKS.index(c.body) if c.body in arm.LINKS else 5
         ends = [placement.points_to_tool(frames.origins[i] + frames.rotations[i] @ np.array(p)) for p in (c.start, c.end)]
         result.append((c.body, ends[0], ends[1], c.radius))
     return result
@@ -77,7 +77,7 @@ def deepest_touch(q: Array, placement: Placement, cloud: Cloud) -> Touch | None:
     worst: Touch | None = None
     for first in range(0, len(q), POSES_AT_ONCE):
         for touch in _touches(_segments(q[first : first + POSES_AT_ONCE], placement), cloud):
-            if touch.depth > (worst.depth if worst else 0.0):
+            if touch.depth > (worst.depth if worst else SLIGHT):
                 worst = touch
     return worst
 

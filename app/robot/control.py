@@ -30,6 +30,7 @@ class Commands:
     feed: Array  # (K, 6) servo targets without contact: q plus the lag of the speed
     points: Array  # (K, 3) tool frame
     normals: Array  # (K, 3)
+    acceleration: Array  # (K, 6) rad/s^2
     wanted: Array  # (K,) N
     phase: NDArray[np.int8]
     region: NDArray[np.int32]
@@ -66,8 +67,9 @@ def command(program: Program, model: mujoco.MjModel, placement: Placement, radiu
         gram = rows @ rows.transpose(0, 2, 1) + 1e-7 * np.eye(5)
         press[part] = (rows.transpose(0, 2, 1) @ np.linalg.solve(gram, push))[:, :, 0]
         sag[part] = np.einsum("pij,pi->pj", linear, local[part]) / stiffness
-    wanted, phase, region = (np.concatenate(b) for b in (program.wanted, program.phase, program.region))
-    return Commands(q, q + speed * damping / stiffness, points, normals, wanted, phase, region, press, sag)
+    wanted, phase, region = np.concatenate(program.wanted), np.concatenate(program.phase), np.concatenate(program.region)
+    acceleration = np.gradient(speed, DT, axis=0) if len(q) > 1 else speed
+    return Commands(q, q + speed * damping / stiffness, points, normals, acceleration, wanted, phase, region, press, sag)
 
 
 class Runner:
@@ -83,6 +85,7 @@ class Runner:
         self._joints = np.zeros((stored, 6))
         self._offset = self._filtered = 0.0
         self._latched = False
+        self._stiffness, self._inertial, self._full = servo_numbers(model)[0], np.zeros(model.nv), np.zeros(model.nv)
         self._sensor, self._tcp = model.site("sensor").id, model.site("tcp").id
         self._data.qpos[:6] = self._data.ctrl[:6] = commands.q[0]
         mujoco.mj_step(model, self._data, TARE_STEPS)
@@ -95,13 +98,19 @@ class Runner:
         """Simulate steps first..last - 1."""
         model, data, tip = self._model, self._data, self._tcp
         for k in range(first, last):
-            data.ctrl[:6] = self._targets(k)
+            data.ctrl[:6] = self._targets(k) + self._inertia(k)
             mujoco.mj_step(model, data)
             self._tip[k] = data.site_xpos[tip]
             if k % self._every == 0:
                 row = k // self._every
                 self._positions[row], self._orientations[row] = data.xpos[self._bodies], data.xquat[self._bodies]
                 self._joints[row] = data.qpos[:6]
+
+    def _inertia(self, k: int) -> Array:
+        """Change of the servo targets that yields the torque the planned acceleration needs."""
+        self._full[:6] = self._commands.acceleration[k]
+        mujoco.mj_mulM(self._model, self._data, self._inertial, self._full)
+        return self._inertial[:6] / self._stiffness
 
     def _targets(self, k: int) -> Array:
         """Servo targets: admittance, spring travel and joint sag for the wanted force, only where the roller may touch."""

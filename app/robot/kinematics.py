@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.geometry.tool import Array
 from app.robot import arm
@@ -23,7 +24,7 @@ class Solution:
     tilt_rad: Array  # (P,) between the tool axis and the inward normal
 
     @property
-    def reached(self) -> Array:
+    def reached(self) -> NDArray[np.bool_]:
         return (self.miss_m < GOOD_M) & (self.tilt_rad < GOOD_RAD)
 
 
@@ -94,4 +95,4 @@ def stiffness_to_singular(q: Array, length: float) -> Array:
     frames = arm.forward(q)
     linear, angular = arm.jacobian(frames, length)
     rows = np.concatenate([linear, TILT_WEIGHT * frames.rotations[5][:, :, :2].transpose(0, 2, 1) @ angular], axis=1)
-    return np.linalg.svd(rows, compute_uv=False)[:, -1]
+    return np.asarray(np.linalg.svd(rows, compute_uv=False)[:, -1], np.float64)

@@ -8,7 +8,7 @@ class RobotParameters:
     """How the roller is led over the tool."""
 
     force_n: float = 20.0  # N, commanded along the surface normal
-    tip_speed: float = 0.14  # m/s in contact
+    tip_speed: float = 0.12  # m/s in contact
     transfer_speed: float = 0.4  # m/s of the tip between regions
     clearance: float = 0.08  # m above the highest point of the tool while moving between regions
     spring: float = 5000.0  # N/m of the roller's slide

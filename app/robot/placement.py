@@ -14,7 +14,7 @@ HEIGHTS = (-0.35, -0.15, 0.05)  # m of the base above the middle of the surface
 KEEP_OFF = 0.15  # m between base and the tool's box in plan view
 LIFT = 0.06  # m above the surface that must be reached too
 PER_REGION = 4  # samples per region
-CHECKED = 5  # best candidates that are checked for collisions
+CHECKED = 3  # best candidates of each side that are checked for collisions
 
 
 def candidates(tool: Tool) -> list[Placement]:
@@ -53,7 +53,8 @@ def choose_placement(tool: Tool, samples: list[Samples], cloud: Cloud, radius: f
     score = reached.mean(axis=1) + 0.5 * np.quantile(np.where(reached, margin, 0.0), 0.1, axis=1)
     poses = solution.q.reshape(len(places), -1, 6)
     best, best_score = places[0], -np.inf
-    for k in np.argsort(-score, kind="stable")[:CHECKED]:
+    by_side = [[k for k in np.argsort(-score, kind="stable") if places[k].yaw == yaw][:CHECKED] for yaw in sorted({p.yaw for p in places})]
+    for k in (k for side in by_side for k in side):
         touch = deepest_touch(poses[k][reached[k]][::2], places[k], cloud) if reached[k].any() else None
         total = float(score[k]) - (0.3 + min(touch.depth, 0.1) if touch else 0.0)
         if total > best_score + 1e-9:

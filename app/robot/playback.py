@@ -66,17 +66,20 @@ def simulate(tool: Tool, sequence: Sequence[int], parameters: RobotParameters, r
     report(0.0, "Looking for a place for the arm")
     work = _prepare(tool)
     cloud, top = cloud_of(tool), float(tool.mesh.vertices[:, 2].max()) + parameters.clearance
-    plans, problems = [], []
+    plans: list[RegionPlan] = []
+    problems: list[list[tuple[str, str]]] = []
+    before = None
     for k, region in enumerate(order):
         report(PLANNED * k / len(order), f"Planning region {tool.regions[region].name}")
         runs = runs_over(work.patches[region], work.roller) if len(work.patches[region].areas) else []
         plans.append(plan_region(region, runs, work.placement, work.roller, top))
-        problems.append(planning_problems(tool, plans[-1], work.placement, work.roller, cloud))
+        problems.append(planning_problems(tool, plans[-1], before, work.placement, work.roller, cloud))
+        before = plans[-1].passes[-1].leave_q[-1] if plans[-1].passes else before
     commands, trace = _drive(tool, work, plans, parameters, report)
     reports: list[RegionReport] = []
     for plan, found in zip(plans, problems, strict=True):
-        after = reports[-1].end_s if reports else 0.0
-        reports.append(region_report(tool, plan, work.samples[plan.region], work.roller, commands, trace, found, after))
+        name, after = tool.regions[plan.region].name, reports[-1].end_s if reports else 0.0
+        reports.append(region_report(name, plan, work.samples[plan.region], work.roller, commands, trace, found, after))
     report(1.0, "Done")
     return _playback(work, parameters, commands, trace, tuple(reports))
 

@@ -20,7 +20,7 @@ HOVER = 0.004  # m above the surface where the slow touch-down begins
 TOUCH_SPEED = 0.01  # m/s
 TOUCH_FORCE = 3.0  # N until the roller has settled
 SETTLE_S, RAMP_S, HOLD_S, EASE_S = 0.12, 0.35, 0.1, 0.25
-SHORTEST_RUN = 3  # waypoints that a run cut by the arm's reach needs to be kept
+SHORTEST_RUN = 3  # waypoints that a piece of a run cut by the arm's reach needs to be kept
 LINE_STEP = 0.008  # m between waypoints in the air
 WAY_UP = 0.5  # how far the tool axis turns upright on the way to clearance height
 FREE, TOUCHING, SWEEPING = 0, 1, 2  # phases: no force control, force control, counted as work
@@ -132,6 +132,8 @@ def _follow(stroke: Stroke, placement: Placement, roller: RollerSize, start: Arr
 
 def _pieces(good: NDArray[np.bool_]) -> list[slice]:
     """Stretches of consecutive reached waypoints."""
+    if good.all():
+        return [slice(0, len(good))]
     edge = np.flatnonzero(np.diff(np.concatenate([[0], good.astype(np.int8), [0]])))
     return [slice(int(a), int(b)) for a, b in zip(edge[::2], edge[1::2], strict=True) if b - a >= SHORTEST_RUN]
 

@@ -8,8 +8,9 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from app.geometry.tool import Array
 from app.robot import arm
 
-BEND = 4.0  # rad/s^2 of joint acceleration that the curvature of the path may use
-TIP_ACCELERATION = 0.8  # m/s^2 along the path
+BEND = 3.0  # rad/s^2 of joint acceleration that the curvature of the path may use
+TIP_ACCELERATION = 0.6  # m/s^2 along the path
+TURN_RATE = 1.5  # rad/s at which the tool axis may follow a bend of the surface
 SPEED_SHARE = 0.8  # of the joint speed limits
 START_SPEED = 1e-3  # m/s: rest, without dividing by zero
 KNOTS_PER_WAYPOINT = 6
@@ -36,12 +37,14 @@ def retime(q: Array, points: Array, normals: Array, tip_speed: float, dt: float)
     length, q, points, normals = length[keep], q[keep], points[keep], normals[keep]
     joints = CubicSpline(length, q, bc_type="natural")
     s = np.linspace(0, length[-1], max(50, KNOTS_PER_WAYPOINT * len(length)))
-    speed = _passes(_caps(joints, s, tip_speed), s[1] - s[0])
+    turning = CubicSpline(length, normals, bc_type="natural")
+    caps = np.minimum(_caps(joints, s, tip_speed), TURN_RATE / np.maximum(np.linalg.norm(turning(s, 1), axis=1), 1e-9))
+    speed = _passes(np.maximum(caps, START_SPEED), s[1] - s[0])
     when = np.concatenate([[0.0], np.cumsum(2 * np.diff(s) / (speed[1:] + speed[:-1]))])
     # a linear s(t) would show jumps of acceleration that are not in the plan
     at = PchipInterpolator(when, s)(np.arange(0, when[-1] + dt, dt).clip(max=when[-1]))
     at = np.clip(at, 0, length[-1])
-    turned = CubicSpline(length, normals, bc_type="natural")(at)
+    turned = turning(at)
     return Timed(joints(at), CubicSpline(length, points, bc_type="natural")(at), turned / np.linalg.norm(turned, axis=1, keepdims=True))
 
 

@@ -1,6 +1,7 @@
 """The strokes of a region joined to as few uninterrupted runs as the surface allows."""
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from app.geometry.tool import Array
@@ -23,7 +24,12 @@ def runs_over(patch: Patch, roller: RollerSize) -> list[Stroke]:
         else:
             parts = (runs[-1], turn, stroke)
             runs[-1] = Stroke(np.concatenate([p.points for p in parts]), np.concatenate([p.normals for p in parts]))
-    return runs
+    return [r for r in runs if _long_enough(r, roller)] or runs[:1]
+
+
+def _long_enough(run: Stroke, roller: RollerSize) -> bool:
+    """Shorter runs at the tip of a region are covered by their neighbours and not worth a touch-down."""
+    return float(np.linalg.norm(np.diff(run.points, axis=0), axis=1).sum()) > 0.3 * roller.width
 
 
 def _ordered(strokes: list[Stroke]) -> list[Stroke]:
@@ -58,7 +64,7 @@ def _turn(run: Stroke, stroke: Stroke, surface: Samples, tree: cKDTree, roller: 
     return Stroke(*_settle(straight, normals, surface, nearest))
 
 
-def _settle(points: Array, normals: Array, surface: Samples, nearest: Array) -> tuple[Array, Array]:
+def _settle(points: Array, normals: Array, surface: Samples, nearest: NDArray[np.int64]) -> tuple[Array, Array]:
     """Points moved along their normal onto the plane of the nearest surface sample."""
     normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
     plane = surface.normals[nearest]
