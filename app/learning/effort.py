@@ -28,6 +28,7 @@ from app.sequencing.classes import equivalent_sequences
 __all__ = ["EFFORT_WORDS", "EffortParameters", "EffortState", "EffortStepResult", "effort_penalty", "effort_step", "start_effort"]
 
 SAME = 1e-9  # places this close are the same
+NOISE = 1e-4  # weights this small against the largest are what the solver leaves of zero
 UNDECIDED = 1e-3  # a pair this far (as a share) outside the cone of known answers is open
 
 Demonstrations = list[LearningDemonstration]
@@ -180,7 +181,8 @@ def _fit(known: list[_Answered], parameters: EffortParameters) -> Array:
     limits = np.r_[np.full(len(strict), -parameters.margin), np.full(len(level), parameters.margin / 2), np.zeros(m + wide)]
     curvature = np.r_[np.full(wide, parameters.regularisation), np.zeros(m)]
     program = QuadraticProgram(curvature, np.r_[np.zeros(wide), np.ones(m)], rows, limits)
-    return np.maximum(solve(program)[:wide], 0.0)
+    weights = np.maximum(solve(program)[:wide], 0.0)
+    return np.where(weights < NOISE * weights.max(), 0.0, weights)
 
 
 def _possible(known: list[_Answered]) -> bool:

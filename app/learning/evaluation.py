@@ -70,6 +70,7 @@ class StudyReport:
     policy: Policy
     tools: tuple[ToolResult, ...]
     faults: tuple[tuple[int, int], ...]  # (tool, number of faults its table has)
+    floor: float  # lower bound of a weight, on scaled features
 
 
 def run_study(
@@ -92,6 +93,7 @@ def run_study(
         NotFound: No tables there.
         MalformedTable: A table can't be read.
     """
+    parameters = parameters or PerformanceParameters()
     tables = _read(kind, folder)
     problems = {number: problem_for(table.tool.graph, INTERACTIONS[kind]) for number, table in tables.items()}
     recorded = {number: _recorded(number, table) for number, table in tables.items()}
@@ -101,7 +103,7 @@ def run_study(
     index = {number: k for k, number in enumerate(tables)}
     covered = coverage(list(problems.values()), [(index[i], recorded[i]) for i in trained], suspected)
     expert = _expert(kind, demonstrations[0])
-    result, answers = _teach(demonstrations, expert, parameters or PerformanceParameters(), seed, report)
+    result, answers = _teach(demonstrations, expert, parameters, seed, report)
     effort, effort_answers = _teach_effort(demonstrations, result, seed)
     features = demonstrations[0].problem.features
     policy = Policy(result.weights, features.name, features.version, INTERACTIONS[kind], effort.effort_weights, result.state.identifiable)
@@ -120,6 +122,7 @@ def run_study(
         policy=policy,
         tools=tools,
         faults=tuple((i, len(table.faults)) for i, table in tables.items() if table.faults),
+        floor=parameters.floor,
     )
 
 

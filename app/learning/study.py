@@ -24,6 +24,7 @@ def format_study(report: StudyReport) -> str:
         f"Iterations         {result.state.iteration} in {result.state.round} round{'s' if result.state.round > 1 else ''}",
         f"Queries            {report.queries} similarity ({report.called_similar} called similar), {report.effort_queries} preference",
         f"Effort             {report.effort.outcome}: {report.effort.message}",
+        f"Weights            {_moved(report)}",
         f"Training violations {report.violations} of {len(trained)} (recorded order not the cheapest at {HIT_GAP:g})",
         f"Hits               train {_hits(trained)}, test {_hits(unseen)}  (lowest cost class, of at most {HIT_SIZE} orders "
         "or equivalent orders only)",
@@ -39,6 +40,14 @@ def format_study(report: StudyReport) -> str:
         told = ", ".join(f"tool {number}: {count}" for number, count in report.faults)
         lines += ["", f"Faults named while reading the tables: {told}."]
     return "\n".join(lines)
+
+
+def _moved(report: StudyReport) -> str:
+    """How far learning went beyond its prior."""
+    state = report.performance.state
+    known = [w for w, live in zip(state.weights, state.identifiable, strict=True) if live]
+    above = sum(w > report.floor * (1 + 1e-6) for w in known)
+    return f"{above} of {len(known)} identifiable weights left their floor; at the floor each counts alike per spread"
 
 
 def _row(t: ToolResult) -> str:

@@ -1,0 +1,158 @@
+"""Eq. 5-6: the exact uniformity test against brute force, closed forms of rho, states and requests."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from app.errors import UnknownFeature
+from app.learning.coverage import coverage
+from app.learning.levels import factor_groups, measure_levels, sample_transitions, sequence_values
+from app.learning.uniformity import uniform_p_value
+from app.sequencing.features import DEFAULT_INTERACTIONS, FEATURE_SETS, Interaction
+from app.sequencing.problem import problem_for
+from tests.sequencing.graphs import grid_graph
+
+
+def brute_force(counts: tuple[int, ...]) -> float:
+    """Sum over every assignment of n observations to k categories that is no likelier than the observed counts."""
+    n, k = sum(counts), len(counts)
+
+    def ways(c):
+        return math.factorial(n) // math.prod(math.factorial(x) for x in c)
+
+    tally = [tuple(row.count(j) for j in range(k)) for row in itertools.product(range(k), repeat=n)]
+    return sum(ways(t) <= ways(counts) for t in tally) / k**n
+
+
+@pytest.mark.parametrize("counts", [(1, 0, 0), (3, 0, 0), (2, 1, 0), (4, 1, 1), (5, 1, 0), (6, 1, 1), (4, 3), (6, 1), (0, 5, 3)])
+def test_exact_p_value_is_the_brute_force_one(counts):
+    assert uniform_p_value(counts) == pytest.approx(brute_force(counts), abs=1e-12)
+
+
+def test_p_value_closed_forms():
+    """All of n in one of three: 3 / 3^n. Large counts: chi-squared with 2 degrees of freedom is exp(-x / 2)."""
+    assert uniform_p_value((6, 0, 0)) == pytest.approx(3**-5)
+    assert uniform_p_value((30, 20, 10)) == pytest.approx(math.exp(-(10**2 + 10**2) / 20 / 2))
+    assert uniform_p_value((7, 7, 7)) == pytest.approx(1.0)
+    assert uniform_p_value((0, 0, 0)) == 1.0
+    assert uniform_p_value((9,)) == 1.0
+
+
+def test_terciles_split_in_three():
+    levels = measure_levels(("a",), np.arange(9.0)[:, None])
+    assert levels.of(np.arange(9.0)[:, None])[:, 0].tolist() == [0, 0, 0, 1, 1, 1, 2, 2, 2]
+
+
+def test_split_feature_is_one_factor():
+    """The clean set has eleven columns but ten factors; together they use each column once."""
+    groups = factor_groups(FEATURE_SETS["clean"])
+    assert len(groups) == 10
+    assert sorted(i for columns in groups.values() for i in columns) == list(range(11))
+    assert groups["height"] == (9, 10)
+
+
+def test_sampled_orders_are_real_orders():
+    """The steps of each sampled order visit every region once and have the feature values of that sequence."""
+    problem = problem_for(grid_graph(2, 3, 4))
+    sampled = sample_transitions(problem)
+    for steps in sampled.orders[:5]:
+        order = tuple(int(a) for a in sampled.region[steps])
+        assert sorted(order) == list(range(6))
+        assert np.allclose(sampled.values[steps], sequence_values(problem, order))
+        rows = problem.step_features(order)
+        assert np.allclose(sampled.values[steps][:, -1], rows[:, 9] + rows[:, 10])
+
+
+@pytest.fixture(scope="module")
+def tools():
+    return [problem_for(grid_graph(3, 3, seed)) for seed in range(1, 6)]
+
+
+def recorded(tools, count):
+    rng = np.random.default_rng(8)
+    return [(i, tuple(int(a) for a in rng.permutation(tools[i].n))) for i in range(count)]
+
+
+def test_no_demonstration_covers_nothing(tools):
+    report = coverage(tools, [], DEFAULT_INTERACTIONS)
+    assert report.rho == 0.0
+    assert report.captured == 0
+    assert report.possible == sum(c.state == "missing" for t in report.tables for row in t.cells for c in row) > 0
+    assert {r.tool_index for r in report.requests} == set(range(5))
+
+
+def test_every_step_lies_in_one_cell_of_each_table(tools):
+    """Counts of a table add up to all demonstrated steps; rho is captured / possible of the cells shown."""
+    report = coverage(tools, recorded(tools, 3), DEFAULT_INTERACTIONS)
+    assert report.steps == 27
+    cells = [[c for row in t.cells for c in row] for t in report.tables]
+    assert [sum(c.count for c in own) for own in cells] == [27, 27]
+    states = [c.state for own in cells for c in own]
+    assert report.captured == states.count("captured")
+    assert report.possible == 18 - states.count("impossible")
+    assert report.rho == pytest.approx(report.captured / report.possible)
+    for own in cells:
+        for c in own:
+            assert (c.state == "missing") == (c.count == 0 and bool(c.tools))
+            assert c.state != "captured" or c.p_value >= 0.05
+            assert c.state != "uneven" or c.p_value < 0.05
+
+
+def test_cell_of_a_step_by_hand(tools):
+    """A demonstrated step's cell is found again from the raw feature values and the stored thresholds."""
+    demos = recorded(tools, 1)
+    report = coverage(tools, demos, (Interaction("height", "curvature"),))
+    rows = tools[0].step_features(demos[0][1])
+    keys = report.thresholds.keys
+    counts = np.zeros((3, 3), int)
+    for row in rows:
+        level = []
+        for key, value in (("height", row[9] + row[10]), ("curvature", row[7])):
+            k = keys.index(key)
+            level.append(int(value > report.thresholds.low[k]) + int(value > report.thresholds.high[k]))
+        counts[level[0], level[1]] += 1
+    assert [[c.count for c in row] for row in report.tables[0].cells] == counts.tolist()
+
+
+def test_repeating_one_step_kind_is_uneven():
+    """Forty times the same order: steps of a cell are all alike, so no well-filled cell is captured."""
+    tool = problem_for(grid_graph(3, 3, 2))
+    order = tuple(range(9))
+    once = coverage([tool], [(0, order)], DEFAULT_INTERACTIONS)
+    often = coverage([tool], [(0, order)] * 40, DEFAULT_INTERACTIONS)
+    assert once.captured > 0
+    assert often.captured < once.captured
+    assert any(c.state == "uneven" for t in often.tables for row in t.cells for c in row)
+
+
+def test_request_gain_is_a_rise_in_rho(tools):
+    """Requests are sorted, name undemonstrated tools and existing regions, and promise no more than all that is missing."""
+    report = coverage(tools, recorded(tools, 1), DEFAULT_INTERACTIONS)
+    gains = [r.gain for r in report.requests]
+    assert gains == sorted(gains, reverse=True)
+    assert all(0 < g <= 1 - report.rho for g in gains)
+    for r in report.requests:
+        assert r.tool_index != 0
+        assert all(0 <= a < tools[r.tool_index].n for a in r.regions)
+
+
+def test_flat_tools_have_impossible_cells():
+    """Without any curvature every curvature level but the lowest is impossible."""
+    flat = grid_graph(2, 3, 3)
+    flat = type(flat)(**{**{f: getattr(flat, f) for f in flat.__dataclass_fields__}, "curvature": np.zeros(6)})
+    report = coverage([problem_for(flat)], [], (Interaction("height", "curvature"),))
+    assert [[c.state for c in row] for row in report.tables[0].cells] == [["missing", "impossible", "impossible"]] * 3
+
+
+def test_other_feature_sets_are_left_out(tools):
+    other = problem_for(grid_graph(2, 3, 1, "real"))
+    report = coverage([*tools, other], recorded(tools, 2), DEFAULT_INTERACTIONS)
+    assert report.left_out == (5,)
+    assert report.rho == coverage(tools, recorded(tools, 2), DEFAULT_INTERACTIONS).rho
+
+
+def test_unknown_factor_is_refused(tools):
+    with pytest.raises(UnknownFeature, match="colour"):
+        coverage(tools, [], (Interaction("height", "colour"),))

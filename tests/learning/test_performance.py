@@ -1,0 +1,196 @@
+"""Algorithm 1: recovery of known weights, resumability bit for bit, honest endings."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.errors import EmptySample, IncompleteSequence, InvalidInput
+from app.learning.expert import ScriptedExpert
+from app.learning.performance import (
+    PARAMETER_WORDS,
+    LearningDemonstration,
+    PerformanceParameters,
+    PerformanceState,
+    performance_step,
+    start_performance,
+)
+from app.sequencing.shortest import shortest_sequence
+from tests.learning.made_up import TRUE_WEIGHTS, demonstrations, learn, problems
+
+EXPERT = ScriptedExpert(TRUE_WEIGHTS, None)
+PARAMETERS = PerformanceParameters(iterations=20, rounds=6)
+ASKING = PerformanceParameters(iterations=3, rounds=30)  # short rounds: the stop test comes early and fails
+CONTRADICTION = PerformanceParameters(iterations=10, rounds=4)
+
+
+@pytest.fixture(scope="module")
+def demos():
+    return demonstrations(EXPERT, problems(4))
+
+
+def asking_seed(demos) -> int:
+    """A seed whose first round ends with questions."""
+    for seed in range(40):
+        state = start_performance(demos, ASKING, seed)
+        if performance_step(demos, ASKING, state, {}, 3).questions:
+            return seed
+    raise AssertionError("no seed asks anything")
+
+
+def test_known_weights_are_recovered(demos):
+    """The learned weights make every demonstration of a known expert the cheapest (1e-9 relative), which random weights do not."""
+    result, _ = learn(demos, EXPERT, PARAMETERS, start_performance(demos, PARAMETERS, 0), 100)
+    assert result.outcome == "converged"
+
+    def excess(w):
+        return max(d.problem.cost(w, d.sequence) / shortest_sequence(d.problem, w).cost - 1 for d in demos)
+
+    assert excess(result.weights) < 1e-9
+    assert excess(np.random.default_rng(0).uniform(0.1, 1, 13)) > 1e-3
+
+
+def test_chunks_do_not_matter(demos):
+    """10 + 10 steps are 20 steps, to the last bit, through JSON in between."""
+    parameters = replace(PARAMETERS, iterations=50)
+    start = start_performance(demos, parameters, 5)
+    whole = performance_step(demos, parameters, start, {}, 20)
+    half = performance_step(demos, parameters, start, {}, 10)
+    stored = PerformanceState.from_json(json.loads(json.dumps(half.state.to_json())))
+    assert stored == half.state
+    rest = performance_step(demos, parameters, stored, {}, 10)
+    assert rest.state == whole.state
+    assert (*half.metrics, *rest.metrics) == whole.metrics
+    assert [m.iteration for m in whole.metrics] == list(range(1, 21))
+
+
+def test_interrupted_run_ends_with_the_same_weights(demos):
+    """Every step in a new 'process' (through JSON), one iteration at a time, against one uninterrupted run with questions."""
+    seed = asking_seed(demos)
+    whole, answers = learn(demos, EXPERT, ASKING, start_performance(demos, ASKING, seed), 1000)
+    assert answers
+    state, given = start_performance(demos, ASKING, seed), {}
+    while True:
+        state = PerformanceState.from_json(json.loads(json.dumps(state.to_json())))
+        step = performance_step(demos, ASKING, state, given, 1)
+        state = step.state
+        if step.questions:  # one answer at a time
+            q = step.questions[0]
+            d = demos[q.demonstration]
+            given[q.fingerprint] = EXPERT.similar(d.problem, d.sequence, q.candidate)
+        elif step.outcome != "training":
+            break
+    assert given == answers
+    assert step.outcome == whole.outcome
+    assert np.array_equal(step.weights, whole.weights)
+
+
+def test_other_seed_other_path(demos):
+    a = performance_step(demos, PARAMETERS, start_performance(demos, PARAMETERS, 1), {}, 5)
+    b = performance_step(demos, PARAMETERS, start_performance(demos, PARAMETERS, 2), {}, 5)
+    assert not np.array_equal(a.weights, b.weights)
+
+
+def test_questions_are_new_and_worth_asking(demos):
+    """No feature sum twice, none equal to the demonstration's, none dearer than the demonstration under the weights at hand."""
+    seen: dict[int, list[np.ndarray]] = {i: [d.problem.feature_sum(d.sequence)] for i, d in enumerate(demos)}
+    state, answers, prints = start_performance(demos, ASKING, asking_seed(demos)), {}, []
+    while True:
+        step = performance_step(demos, ASKING, state, answers, 1000)
+        state = step.state
+        if step.outcome not in ("training", "questions"):
+            break
+        for q in step.questions:
+            d = demos[q.demonstration]
+            phi = d.problem.feature_sum(q.candidate)
+            assert all(np.abs(phi - known).max() > 1e-9 for known in seen[q.demonstration])
+            assert d.problem.cost(step.weights, q.candidate) <= d.problem.cost(step.weights, d.sequence) * (1 + 1e-3)
+            assert q.differs == tuple(a for a, b in zip(d.sequence, q.candidate, strict=True) if a != b)
+            seen[q.demonstration].append(phi)
+            prints.append(q.fingerprint)
+            answers[q.fingerprint] = "not_similar"
+    assert prints
+    assert len(set(prints)) == len(prints)
+
+
+def test_open_question_blocks_and_undo_reopens(demos):
+    """No step is taken while an answer is missing; taking one back asks the same question again."""
+    state = start_performance(demos, ASKING, asking_seed(demos))
+    asked = performance_step(demos, ASKING, state, {}, 1000)
+    waiting = performance_step(demos, ASKING, asked.state, {}, 1000)
+    assert waiting.outcome == "questions"
+    assert waiting.questions == asked.questions
+    assert waiting.metrics == ()
+    answers = {q.fingerprint: "not_similar" for q in asked.questions}
+    later = performance_step(demos, ASKING, asked.state, answers, 1)
+    assert later.metrics
+    taken_back = dict(list(answers.items())[1:])
+    again = performance_step(demos, ASKING, later.state, taken_back, 1)
+    assert [q.fingerprint for q in again.questions] == [asked.questions[0].fingerprint]
+
+
+def test_not_similar_answers_change_the_weights_similar_ones_do_not(demos):
+    """Only a candidate called not similar joins the sample X (Algorithm 1)."""
+    state = start_performance(demos, ASKING, asking_seed(demos))
+    asked = performance_step(demos, ASKING, state, {}, 1000)
+    first = asked.questions[0].fingerprint
+
+    def after(value: str):
+        answers = {q.fingerprint: "not_similar" for q in asked.questions} | {first: value}
+        if len(asked.questions) == 1 and value == "similar":
+            return None
+        return performance_step(demos, ASKING, asked.state, answers, 2).weights
+
+    assert not np.array_equal(after("not_similar"), after("cant_tell"))
+
+
+def contradiction() -> list[LearningDemonstration]:
+    """The same tool demonstrated in two orders that no weights both prefer: one as its expert likes it, one backwards."""
+    tool = problems(1)[0]
+    order = EXPERT.sequence(tool)
+    return [LearningDemonstration(tool, order), LearningDemonstration(tool, order[::-1])]
+
+
+def test_contradicting_demonstrations_end_as_infeasible():
+    demos = contradiction()
+    result, _ = learn(demos, ScriptedExpert(None, None), CONTRADICTION, start_performance(demos, CONTRADICTION, 0), 1000)
+    assert result.outcome == "infeasible"
+    assert "demonstration" in result.message
+    assert np.isfinite(result.weights).all()
+
+
+def test_all_similar_stalls():
+    """Contradicting demonstrations whose every alternative the expert calls just as good: nothing grows."""
+    demos = contradiction()
+    state = start_performance(demos, CONTRADICTION, 0)
+    while (step := performance_step(demos, CONTRADICTION, state, {}, 1000)).outcome == "training":
+        state = step.state
+    assert step.outcome == "questions"
+    stalled = performance_step(demos, CONTRADICTION, step.state, {q.fingerprint: "similar" for q in step.questions}, 1000)
+    assert stalled.outcome == "stalled"
+    assert stalled.metrics == ()
+
+
+def test_loss_falls_and_violations_vanish(demos):
+    parameters = replace(PARAMETERS, iterations=60)
+    step = performance_step(demos, parameters, start_performance(demos, parameters, 3), {}, 60)
+    assert step.metrics[-1].loss < 0.5 * step.metrics[0].loss
+    assert step.metrics[-1].loss == pytest.approx(sum(step.metrics[-1].terms.values()))
+
+
+def test_refusals(demos):
+    with pytest.raises(EmptySample, match="at least one"):
+        start_performance([], PARAMETERS, 0)
+    with pytest.raises(IncompleteSequence):
+        start_performance([LearningDemonstration(demos[0].problem, (0, 1, 2))], PARAMETERS, 0)
+    state = start_performance(demos, PARAMETERS, 0)
+    with pytest.raises(InvalidInput, match="started with"):
+        performance_step(demos[:-1], PARAMETERS, state, {}, 1)
+    bare = replace(demos[0].problem, interactions=())
+    with pytest.raises(InvalidInput, match="same features"):
+        start_performance([demos[1], LearningDemonstration(bare, demos[0].sequence)], PARAMETERS, 0)
+
+
+def test_every_hyperparameter_has_words():
+    assert set(PARAMETER_WORDS) == set(PerformanceParameters.__dataclass_fields__)
