@@ -67,6 +67,8 @@ export function drawRail(project, here) {
 
 export function statusOf(project) {
   if (project?.counts.open_queries) return { state: "waiting", text: `Waiting for you: ${plural(project.counts.open_queries, "question")}`, page: "teach" };
+  const waiting = project?.stages.find((stage) => stage.state === "wait");
+  if (waiting) return { state: "waiting", text: `Waiting for you: ${waiting.meta}`, page: STAGES.find((stage) => stage.key === waiting.key).page };
   if (project?.running.length) return { state: "running", text: project.running[0].title, page: null };
   return { state: "idle", text: "Nothing is waiting", page: null };
 }
