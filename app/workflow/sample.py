@@ -21,21 +21,22 @@ from app.workflow.tool_rows import add_cut
 
 AUTHOR = "Scripted expert"
 LEFT_TO_RECORD = 1  # training moulds at the end of the list that get no demonstration
-# Cost per feature of the scripted expert: jumps and gaps left behind are worst, then open borders and climbing.
+# Cost per feature of the scripted expert: stepping down, open borders and open opposite sides are worst. Far enough from where
+# learning starts that it has to ask a few questions.
 WEIGHTS = {
-    "borders_unfinished": 0.6,
-    "borders_finished": 0.1,
-    "opposite_unfinished": 0.3,
-    "opposite_finished": 0.1,
-    "jump": 1.0,
-    "gaps_inside": 0.3,
-    "gaps_left": 0.8,
-    "curvature": 0.4,
-    "orientation": 0.3,
-    "height_up": 0.5,
-    "height_down": 0.2,
-    "height*curvature": 0.4,
-    "orientation*curvature": 0.2,
+    "borders_unfinished": 1.0,
+    "borders_finished": 0.02,
+    "opposite_unfinished": 1.0,
+    "opposite_finished": 0.02,
+    "jump": 0.05,
+    "gaps_inside": 0.02,
+    "gaps_left": 0.02,
+    "curvature": 0.5,
+    "orientation": 0.02,
+    "height_up": 0.02,
+    "height_down": 2.0,
+    "height*curvature": 0.02,
+    "orientation*curvature": 0.02,
 }
 EFFORT = {"start_right": 1.0, "start_back": 0.4}  # the expert stands at the left front corner; where work ends costs nothing
 

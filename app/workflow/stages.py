@@ -176,7 +176,8 @@ def _teach_step(p: Progress) -> Json | None:
         text = "Every order it showed was just as good as yours. Take what it has learned, or record another tool."
         return _step("Nothing left to learn from", text, "Decide", "teach")
     if last and last.state == "infeasible":
-        return _step("Two orders contradict each other", "No rule explains both. Record one of them again.", "Look at them", "teach")
+        text = "Record one of the orders it names again, or take the compromise it found."
+        return _step("No rule explains all orders", text, "Decide", "teach")
     if last and last.state == "failed":
         return _step("Learning stopped", last.message, "Go on", "teach")
     if not p.policies:
