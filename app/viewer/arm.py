@@ -8,6 +8,7 @@ from app.robot.playback import Playback
 from app.viewer.palette import Rgb, rgb, theme
 from app.viewer.picture import Progress
 
+LIGHT_BODIES = frozenset({"upper arm", "forearm"})
 REACH_SAMPLES = 200  # poses looked at to find the room the arm needs
 
 
@@ -65,6 +66,8 @@ class Arm:
 
 
 def body_colour(name: str, dark: bool) -> Rgb:
-    """Links light, joints and base dark."""
+    """Long links light, joints and base dark, the roller in the colour of what is going on."""
     colours = theme(dark)
-    return rgb(colours.arm if "link" in name or "arm" in name else colours.arm_joint)
+    if name == "roller":
+        return rgb(colours.current)
+    return rgb(colours.arm if name in LIGHT_BODIES else colours.arm_joint)

@@ -149,7 +149,7 @@ class Hub:
             self._drop(data["session_id"])
             return
         for view in self._views.values():
-            if data.get("session_id") == view.sid and event.type == "scene.changed":
-                view.submit(Refresh())
-            elif data.get("tool_id") == view.tool_id and event.type in ("draft.changed", "tool.changed"):
+            about_tool = event.type in ("draft.changed", "tool.changed") and data.get("tool_id") == view.tool_id
+            about_playback = event.type == "playback.changed" and data.get("playback_id") == view.playback_id
+            if about_tool or about_playback or (event.type == "scene.changed" and data.get("session_id") == view.sid):
                 view.submit(Refresh())

@@ -6,7 +6,7 @@ import numpy as np
 
 from app.geometry.tool import Array, Tool
 
-AZIMUTH, ELEVATION = -0.46, 0.74  # rad; the camera stands to the left in front of the tool and looks down on it
+AZIMUTH, ELEVATION = -0.46, 0.84  # rad; the camera stands to the left in front of the tool and looks down on it
 FIELD_OF_VIEW = 0.56  # rad, vertical
 FILL_HEIGHT, FILL_WIDTH = 0.80, 0.82  # largest share of the canvas the tool may take
 MIDDLE = 0.03  # of the canvas height: how far above its middle the tool stands, because pages have their buttons below

@@ -10,7 +10,9 @@ import logging
 import time
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal, get_args
+
+import numpy as np
 
 from app.errors import AppError
 from app.geometry.tool import Tool
@@ -24,15 +26,26 @@ from app.viewer.stage import Stage, open_server
 
 log = logging.getLogger(__name__)
 
+Letters = Literal[
+    "A", "B", "C", "D", "E", "F", "G", "H", "I", "J", "K", "L", "M", "N", "O", "P", "Q", "R", "S", "T", "U", "V", "W", "X", "Y", "Z"
+]
+
 TICK = 1 / 25  # s between poses of a running recording
-HOTKEY_REGIONS = 26
+LETTERS: tuple[Letters, ...] = get_args(Letters)
 
 
 @dataclass(frozen=True)
 class Pick:
-    """A click on a region, or its letter."""
+    """A click on a region."""
 
     region: int
+
+
+@dataclass(frozen=True)
+class Letter:
+    """The key that is a region's name."""
+
+    name: str
 
 
 @dataclass(frozen=True)
@@ -45,6 +58,9 @@ class Command:
 @dataclass(frozen=True)
 class Refresh:
     """Something stored has changed."""
+
+
+Task = Pick | Letter | Command | Refresh
 
 
 @dataclass(frozen=True)
@@ -61,6 +77,13 @@ class Clock:
         return min(self.time + passed, cycle)
 
 
+def same_shape(one: Tool | None, other: Tool | None) -> bool:
+    """Whether the same nodes serve both; names may differ."""
+    if one is other or one is None or other is None:
+        return one is other
+    return np.array_equal(one.labels, other.labels) and np.array_equal(one.mesh.vertices, other.mesh.vertices)
+
+
 class View:
     """A viser server, what it shows, and the queue of what is to be done."""
 
@@ -70,9 +93,10 @@ class View:
         self.stops: set[asyncio.Event] = set()  # one per connected browser; set to end its bridge
         self._actions = actions
         self._loop = loop
-        self._queue: asyncio.Queue[Pick | Command | Refresh] = asyncio.Queue()
+        self._queue: asyncio.Queue[Task] = asyncio.Queue()
         self._scene: Json = {}
-        self._built: tuple[Any, ...] = ()
+        self._dark: bool | None = None  # theme the nodes were built with
+        self._tints: tuple[int, ...] = ()
         self._tool: Tool | None = None
         self._playback: Playback | None = None
         self._arm: Arm | None = None
@@ -91,9 +115,13 @@ class View:
     def tool_id(self) -> str | None:
         return self._scene.get("tool_id")
 
+    @property
+    def playback_id(self) -> str | None:
+        return self._scene.get("playback_id")
+
     # -- from viser's thread and the store's -----------------------------------------------------------------------------
 
-    def submit(self, command: Pick | Command | Refresh) -> None:
+    def submit(self, command: Task) -> None:
         """Queue a command from any thread."""
         with contextlib.suppress(RuntimeError):  # the loop has ended: nobody is looking any more
             self._loop.call_soon_threadsafe(self._queue.put_nowait, command)
@@ -104,11 +132,10 @@ class View:
     def _add_hotkeys(self) -> None:
         for label, name, modifier in (("Undo", "undo", "cmd/ctrl"), ("Redo", "redo", "cmd/ctrl+shift")):
             self.server.gui.add_command(label, hotkey="Z", modifier=modifier).on_trigger(self._triggered(Command(name)))
-        for region in range(HOTKEY_REGIONS):
-            letter = chr(ord("A") + region)
-            self.server.gui.add_command(f"Region {letter}", hotkey=letter).on_trigger(self._triggered(Pick(region)))
+        for letter in LETTERS:
+            self.server.gui.add_command(f"Region {letter}", hotkey=letter).on_trigger(self._triggered(Letter(letter)))
 
-    def _triggered(self, command: Pick | Command) -> Callable[[object], Awaitable[None]]:
+    def _triggered(self, command: Task) -> Callable[[object], Awaitable[None]]:
         async def triggered(_event: object) -> None:
             self.submit(command)
 
@@ -126,7 +153,7 @@ class View:
             if not self._closed:
                 await asyncio.to_thread(self._guarded, command)
 
-    async def _next(self) -> Pick | Command | Refresh | None:
+    async def _next(self) -> Task | None:
         """The next command, or None when a running recording wants its next pose first."""
         if not (self._clock.playing and self._arm):
             return await self._queue.get()
@@ -152,7 +179,7 @@ class View:
 
     # -- in a worker thread ----------------------------------------------------------------------------------------------
 
-    def _guarded(self, command: Pick | Command | Refresh | None) -> None:
+    def _guarded(self, command: Task | None) -> None:
         """The one place where failures of a view end: people read those meant for them, the rest is logged."""
         try:
             self.do(command)
@@ -162,12 +189,16 @@ class View:
             if not self._closed:
                 log.exception("view %s failed on %s", self.sid, command)
 
-    def do(self, command: Pick | Command | Refresh | None) -> None:
+    def do(self, command: Task | None) -> None:
         """Carry out a command; None advances a running recording."""
         match command:
             case Pick(region):
                 if self._tool is not None and region < self._tool.n:
                     self._actions.pick(self.sid, region)
+            case Letter(letter):
+                named = [region for region, its in enumerate(self._tool.regions) if its.name == letter] if self._tool else []
+                if named:
+                    self._actions.pick(self.sid, named[0])
             case Command(name):
                 if self._scene.get("mode") == "record":
                     self._actions.command(self.sid, name)
@@ -190,17 +221,25 @@ class View:
         tool_id, playback_id = self._scene.get("tool_id"), self._scene.get("playback_id")
         mode, dark = self._scene.get("mode", "empty"), bool(self._scene.get("dark"))
         tool = self._actions.tool_value(tool_id) if tool_id and mode != "empty" else None
-        playback = self._actions.playback_value(playback_id) if playback_id and mode == "robot" else None
-        wanted = (tool_id if tool else None, id(tool.mesh) if tool else None, id(tool.labels) if tool else None, id(playback), dark)
-        moved = wanted[:4] != self._built[:4]
+        playback = self._recording(playback_id) if playback_id and mode == "robot" else None
+        moved = not same_shape(tool, self._tool) or playback is not self._playback
         self._tool, self._playback = tool, playback
-        if wanted == self._built:
+        if tool is not None:
+            self._tints = tint_choice(tool.graph.neighbour)
+        if not moved and dark == self._dark:
             return
+        self._dark = dark
         self.stage.build(tool, dark)
         self._arm = Arm(self.server, playback, dark) if playback is not None else None
         if tool is not None and moved:
             self.stage.place_camera(camera_for(tool, room_needed(playback) if playback is not None else None))
-        self._built = wanted
+
+    def _recording(self, playback_id: str) -> Playback | None:
+        """The robot's recording; None while it is still being computed, which its page tells."""
+        try:
+            return self._actions.playback_value(playback_id)
+        except AppError:
+            return None
 
     def _advance(self) -> None:
         """Paint what the scene says now."""
@@ -213,7 +252,7 @@ class View:
             if now >= self._playback.cycle_s:
                 self._clock = Clock(False, now, self._clock.speed)
         names = [region.name for region in self._tool.regions]
-        picture = paint(self._progress(now), names, tint_choice(self._tool.graph.neighbour), bool(self._scene.get("dark")))
+        picture = paint(self._progress(now), names, self._tints, bool(self._dark))
         if picture != self.stage.shown:
             self.stage.paint(picture)
 
