@@ -104,8 +104,9 @@ def test_teaching_to_the_robot(api: Api, sample: dict[str, Any]) -> None:
     metrics = api.get(f"/runs/{run['id']}/metrics")["items"]
     assert [m["iteration"] for m in metrics] == sorted(m["iteration"] for m in metrics)
     assert metrics[-1]["iteration"] == run["iteration"]
-    later = api.get(f"/runs/{run['id']}/metrics", params={"after": metrics[9]["iteration"]})["items"]
-    assert later == metrics[10:]
+    assert len(metrics) >= 4
+    later = api.get(f"/runs/{run['id']}/metrics", params={"after": metrics[2]["iteration"]})["items"]
+    assert later == metrics[3:]
 
     effort = teach(api, api.post(f"/projects/{project}/runs", {"kind": "effort", "seed": 3}, status=202), "left")
     effort = api.until(f"/runs/{effort['id']}", lambda row: row["state"] in ("converged", "infeasible", "failed"))
