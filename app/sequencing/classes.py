@@ -75,7 +75,8 @@ def _representative(solution: Solution, merged: Merged, which: int) -> tuple[int
         error, a, which = min(
             (abs(solution.table[state, a] + merged.totals[j, q] - target), a, q)
             for a in range(solution.n)
-            if not state >> a & 1 and (j := merged.row[state | 1 << a]) >= 0
+            for j in [merged.row[state | 1 << a]]
+            if not state >> a & 1 and j >= 0
             for q in range(merged.filled[j])
         )
         assert error <= 1e-12 * solution.scale  # the opener's total was computed from these very numbers

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from app.geometry.tool import GraphSource
 from app.sequencing import kernels
 from app.sequencing.comparison import kendall_tau
-from app.sequencing.large import beam, best_found, reorder
+from app.sequencing.large import beam, best_found, improve, reorder
 from app.sequencing.problem import problem_for
 from app.sequencing.shortest import TIE_CAP, cost_to_go, shortest_sequence
 from tests.sequencing.graphs import every_order, grid_graph
@@ -88,6 +88,15 @@ def test_reorder_keeps_the_rest_and_never_gets_worse():
     assert better[6:] == order[6:]
     assert sorted(better) == list(range(8))
     assert problem.cost(w, better) <= problem.cost(w, order) + 1e-12
+
+
+def test_improving_goes_on_until_no_stretch_gains():
+    problem, w = problem_for(grid_graph(4, 6, 3)), np.random.default_rng(0).normal(size=13)
+    found = improve(problem, w, tuple(range(24)), 6)
+    cost = problem.cost(w, found)
+    assert cost < problem.cost(w, range(24))
+    for start in (*range(0, 19, 2), 18):  # the stretches that a sweep tries
+        assert problem.cost(w, reorder(problem, w, found, start, 6)) == pytest.approx(cost, abs=1e-9)
 
 
 def test_large_tools_are_not_called_proved():
