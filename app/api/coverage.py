@@ -52,6 +52,8 @@ class InteractionTable(Row):
     first: str
     second: str
     label: str
+    row_title: str
+    column_title: str
     row_words: list[str]
     column_words: list[str]
     cells: list[list[Cell]]

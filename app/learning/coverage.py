@@ -21,6 +21,7 @@ CellState = Literal["captured", "uneven", "missing", "impossible"]
 Grid = NDArray[np.int64]
 
 SIGNIFICANCE = 0.05
+ORDERS_TRIED = 12  # per tool, for the gain of a request
 SHOWN = 3  # regions named per tool and cell
 LEVEL_WORDS = ("small", "middle", "large")
 PHRASES = {"height": "step in height", "curvature": "change of curvature", "orientation": "turn towards neighbours"}
@@ -47,6 +48,8 @@ class InteractionTable:
     """3 x 3 cells; rows are levels of the first factor, columns of the second, both rising."""
 
     interaction: Interaction
+    row_title: str  # "step in height"
+    column_title: str
     row_words: tuple[str, ...]
     column_words: tuple[str, ...]
     cells: tuple[tuple[Cell, ...], ...]
@@ -59,7 +62,7 @@ class Request:
     text: str
     tool_index: int
     regions: tuple[int, ...]
-    gain: float  # in rho, mean over orders of the tool
+    gain: float  # in rho, of the best of a few orders of the tool; 0 when each new situation costs another its even spread
 
 
 @dataclass(frozen=True)
@@ -99,7 +102,7 @@ def coverage(
         Each other feature is tested for even spread over the levels that occur within that cell on any tool; p-values are
             Bonferroni-corrected, otherwise ten features would often fail by chance. A feature with one value in more than a third of all
             transitions has no three levels and is not tested. The authors' code uses a skewness limit instead.
-        The gain of a tool is the mean rise of rho over a few random orders of it: which one the expert would choose isn't known yet.
+        The gain of a tool is the largest rise of rho over a few random orders of it: which one the expert would choose isn't known yet.
     """
     first = demonstrations[0][0] if demonstrations else 0
     kind = [p.features for p in problems]
@@ -201,7 +204,7 @@ class _Study:
             text = self.words(k, cell)
             tools = self.places(k, cell)
             cells.append(Cell(j.state, j.count, j.p_value, tools, text, _advice(j.state, text, tools, waiting)))
-        return InteractionTable(self.interactions[k], LEVEL_WORDS, LEVEL_WORDS, tuple(tuple(cells[r : r + 3]) for r in (0, 3, 6)))
+        return InteractionTable(self.interactions[k], *self.phrases[k], LEVEL_WORDS, LEVEL_WORDS, tuple(tuple(cells[r : r + 3]) for r in (0, 3, 6)))
 
     def words(self, k: int, cell: int) -> str:
         row, column = divmod(cell, 3)
@@ -210,21 +213,22 @@ class _Study:
     def requests(
         self, steps: Grid, tables: tuple[InteractionTable, ...], waiting: list[int], captured: int, possible: int
     ) -> list[Request]:
-        """One request per tool without a demonstration that is expected to raise rho."""
+        """One request per tool without a demonstration that can raise rho or has a situation nobody has shown."""
         found = []
         for i in waiting:
             gains = []
-            for order in self.sampled[i].orders[:6]:
+            for order in self.sampled[i].orders[:ORDERS_TRIED]:
                 now, of = _tally(self.states(np.concatenate([steps, self.grids[i][order]])))
                 gains.append(now / of - (captured / possible if possible else 0.0))
             weak = [(c, dict(c.tools)[i]) for t in tables for row in t.cells for c in row if c.request and i in dict(c.tools)]
-            if weak and np.mean(gains) > 1e-9:
+            gain = max(0.0, *gains)
+            if gain > 0 or any(c.state == "missing" for c, _ in weak):
                 weak.sort(key=lambda pair: pair[0].state != "missing")
                 regions = tuple(dict.fromkeys(a for _, own in weak[:2] for a in own))[:SHOWN]
                 letters = region_letters(self.regions[i])
                 places = _listed([letters[a] for a in sorted(regions)])
                 text = f"{_listed([c.text for c, _ in weak[:2]])}, most of all at {places}"
-                found.append(Request(text[0].upper() + text[1:], i, tuple(sorted(regions)), float(np.mean(gains))))
+                found.append(Request(text[0].upper() + text[1:], i, tuple(sorted(regions)), float(gain)))
         return found
 
 

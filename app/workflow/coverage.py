@@ -96,6 +96,8 @@ def _table(ctx: Context, session: Session, cut: Segmentation, tools: list[ToolRo
         "first": interaction.first,
         "second": interaction.second,
         "label": interaction_label(interaction, features),
+        "row_title": table.row_title,
+        "column_title": table.column_title,
         "row_words": list(table.row_words),
         "column_words": list(table.column_words),
         "cells": [[_cell(tools, cell) for cell in row] for row in table.cells],

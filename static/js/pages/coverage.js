@@ -28,7 +28,7 @@ const parts = {
   title: h("h2"),
   note: h("span.push.small.muted"),
   stage: h("div.stage.example", { "aria-label": "3D view" }),
-  suspect: h("details", {}, h("summary.card-head.small", {}, "What do you think matters?")),
+  suspect: h("details", {}, h("summary", {}, "What do you think matters?")),
   suspectBody: h("div.suspect"),
 };
 const state = { report: null, chosen: null, view: null };
@@ -72,13 +72,14 @@ function matrix(table, t) {
   return h("section.card", {}, h("div.card-head", {}, h("h2", {}, sentence(table.label)), h("span.push.small.muted.num", {}, `${possible.filter((entry) => entry.state === "captured").length} of ${possible.length}`)),
     h("div.card-body", {}, h("div.matrix", { role: "group", "aria-label": table.label },
       table.cells.map((_, k) => table.cells.length - 1 - k).map((i) => [h("span.rowname", {}, table.row_words[i]), table.cells[i].map((_, j) => cell(table, t, i, j))]),
-      h("span"), table.column_words.map((word) => h("span.col", {}, word)))));
+      h("span"), table.column_words.map((word) => h("span.col", {}, word)))),
+    h("p.axes.small.muted", {}, `upwards: ${table.row_title}, to the right: ${table.column_title}`));
 }
 
 function paintRequests() {
   const { requests } = state.report;
   fill(parts.requests, requests.length ? requests.map((request, index) => h("button", { type: "button", dataset: { key: `request-${index}` }, "aria-pressed": String(state.chosen?.request === index), onclick: () => choose({ request: index }) },
-    h("b.strong", {}, request.tool_name), h("span.gain", { dataset: { tip: "How much higher rho can get with this demonstration" } }, `+${request.gain.toFixed(2)}`), h("span.small.muted", {}, request.text))) : h("p.empty-words.small", { style: { padding: "var(--s-3) var(--s-4)" } }, "Your tools show no further situation. New shapes would need a new tool."));
+    h("b.strong", {}, request.tool_name), h("span.gain", { dataset: { tip: request.gain > 0 ? "How much rho can rise with this demonstration, by the best of a few orders" : "It shows a situation nobody has shown, but makes another less even" } }, request.gain > 0 ? `+${request.gain.toFixed(2)}` : "new"), h("span.small.muted", {}, request.text))) : h("p.empty-words.small", { style: { padding: "var(--s-3) var(--s-4)" } }, "Your tools show no further situation. New shapes would need a new tool."));
 }
 
 function shown() {

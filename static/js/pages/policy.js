@@ -41,12 +41,16 @@ function causes() {
   return keys;
 }
 
-function paintChart() {
-  const keys = causes();
-  const columns = state.plan.steps.map((step, i) => ({ title: `Step ${i + 1}, ${step.name}`, parts: keys.map((key) => key.columns.reduce((sum, k) => sum + step.parts[k], 0)) }));
-  state.chart = stackedBars(parts.chart, { keys, columns, description: `Cost per step of the order for ${state.tool.name}` });
+function paintLegend(keys) {
   fill(parts.legend, keys.map((key, k) => h("button", { type: "button", dataset: { key: `cause-${k}`, tip: `${key.label} (${key.symbol})` }, onpointerenter: () => state.chart.only(k), onpointerleave: () => state.chart.only(null), onfocus: () => state.chart.only(k), onblur: () => state.chart.only(null) },
     h("span.swatch", { style: { "--swatch": key.colour } }), key.label)));
+}
+
+function paintChart() {
+  const keys = causes();
+  paintLegend(keys);
+  const columns = state.plan.steps.map((step, i) => ({ title: `Step ${i + 1}, ${step.name}`, parts: keys.map((key) => key.columns.reduce((sum, k) => sum + step.parts[k], 0)) }));
+  state.chart = stackedBars(parts.chart, { keys, columns, description: `Cost per step of the order for ${state.tool.name}` });
 }
 
 // ---- what if --------------------------------------------------------------------------------------------------------------------
@@ -129,14 +133,14 @@ function paintHead() {
   fill(parts.head, h("div.title", {}, h("h1", {}, `The order for ${tool.name}`), h("p", {}, `${plan.demonstrated ? "You have demonstrated this tool." : "Nobody has demonstrated this tool."} ${learned}`)),
     h("button.btn.quiet", { type: "button", style: { "margin-left": "auto" }, dataset: { key: "weights" }, onclick: showWeights }, icon("table"), "What it learned"),
     h("button.btn.quiet", { type: "button", dataset: { key: "export", tip: "The order, its cost and its explanation as JSON" }, onclick: save }, icon("download"), "Export"),
-    h("div.next", { style: { "margin-left": "0" } }, h("p", {}, h("span.kicker", {}, "Next: watch the robot do it"), "in simulation"), h("a.btn.primary", { href: pageAddress(shell.projectId, "robot", { plan: plan.id }) }, "Open on the robot")));
+    h("div.next", { style: { "margin-left": "0" } }, h("p", {}, h("span.kicker", {}, "Next: watch the robot"), "in simulation"), h("a.btn.primary", { href: pageAddress(shell.projectId, "robot", { plan: plan.id }) }, "Open on the robot")));
 }
 
 function paintProof() {
   const { plan } = state;
   parts.proof.dataset.proved = String(plan.proved);
   fill(parts.proof, icon(plan.proved ? "shield" : "warn"), h("div", {}, h("b", {}, plan.proved ? "Proved cheapest" : "Best found"),
-    h("span.small.muted", {}, plan.proved ? `All ${plan.orders} orders considered, in ${number(plan.milliseconds)} ms.` : `${sentence(plan.method)}. No proof for ${plural(plan.sequence.length, "region")}.`)));
+    h("span.small.muted", {}, plan.proved ? `All ${plan.orders} orders, in ${number(plan.milliseconds, 2)} ms` : `${sentence(plan.method)}. No proof for ${plural(plan.sequence.length, "region")}.`)));
   const fact = (term, value, tip = null) => h("div.fact", { dataset: tip ? { tip } : {} }, h("dt", {}, term), h("dd", {}, value));
   fill(parts.facts, fact("Cost", number(plan.cost), "C = w · Φ, added along the order; low is good"),
     fact("Equally cheap", plan.ties === 1 ? "this one only" : `${Number(plan.ties).toLocaleString("en")} orders`, "Orders in the lowest cost class (relative 1e-7)"),
@@ -182,9 +186,9 @@ async function open(tool) {
 function paint() {
   paintHead();
   paintProof();
-  paintChart();
   paintOrder();
   paintWhatIf();
+  paintChart(); // last: it fills what the others leave
 }
 
 async function load() {

@@ -26,6 +26,8 @@ const parts = {
   slider: h("input", { type: "range", min: "0", step: "0.1", value: "0", "aria-label": "Time" }),
   at: h("span.at.num"),
   speed: h("button.btn.quiet.small", { type: "button", dataset: { tip: "Playback speed (S)" }, onclick: () => nextSpeed() }),
+  timeline: h("div.timeline"),
+  plots: h("div.plots"),
   force: h("div.chart"),
   path: h("div.chart"),
   alert: h("div.alert"),
@@ -157,6 +159,7 @@ function paint() {
   const { playback, plan } = state;
   const busy = parts.stage.querySelector(".preview-wait");
   busy?.remove();
+  for (const node of [parts.live, parts.timeline, parts.plots, parts.totals]) node.hidden = !ready();
   if (ready()) {
     paintReady();
     state.view.show({ mode: "robot", tool_id: plan.tool_id, sequence: plan.sequence, playback_id: playback.id }, `The arm works ${plan.tool_name}, ${plural(plan.sequence.length, "region")}`);
@@ -222,8 +225,10 @@ async function start() {
   parts.speed.textContent = "1x";
   const th = (label, tip) => h("th.num", { dataset: { tip } }, label);
   parts.stage.append(parts.live);
+  parts.timeline.append(h("div.scrubber", {}, parts.play, h("div.track", {}, parts.bands, parts.slider), parts.at, parts.speed));
+  parts.plots.append(parts.force, parts.path);
   fill(shell.main, parts.head, h("div.robot", {},
-    h("section.card.cell-card", {}, parts.stage, h("div.timeline", {}, h("div.scrubber", {}, parts.play, h("div.track", {}, parts.bands, parts.slider), parts.at, parts.speed)), h("div.plots", {}, parts.force, parts.path)),
+    h("section.card.cell-card", {}, parts.stage, parts.timeline, parts.plots),
     h("aside.card.fill", {}, parts.alert, h("div.table-wrap.scroll", {}, h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, "Step"), h("th", {}, "Region"), th("Force error", "Root mean square of measured minus commanded force"), th("Off path", "Largest sideways distance from the planned stroke"), th("Covered", "Share of the region's area under the roller"), th("Time", "From touch-down to lift-off"), h("th", {}, h("span.visually-hidden", {}, "State")))), parts.rows)), parts.totals)));
   state.view = new View3D(parts.stage, { projectId: shell.projectId, name: "robot" });
   bind({ key: " ", shown: "Space", name: "Play or pause", run: toggle });
