@@ -48,6 +48,11 @@ function points(x, values, toX, toY, width) {
 export function drawCurves(box, { title, x, series, whole = false, xTitle = "step" }) {
   const { width, height } = box.getBoundingClientRect();
   if (width < 40 || height < 40) return;
+  if (!x.length) {
+    box.classList.add("skeleton");
+    return;
+  }
+  box.classList.remove("skeleton");
   const { low, high } = bounds(series, whole);
   const first = x[0] ?? 0;
   const last = Math.max(first + 1, x.at(-1) ?? 1);
