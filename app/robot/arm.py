@@ -86,4 +86,13 @@ def jacobian(frames: Frames, length: float) -> tuple[Array, Array]:
     """Derivatives of the tool tip's position and rotation by the joints, each (P, 3, 6), base frame."""
     axes = frames.rotations[:, :, :, 2].transpose(1, 2, 0)
     arms = (tip(frames, length) - frames.origins).transpose(1, 2, 0)
-    return np.cross(axes, arms, axis=1), axes
+    return cross(axes, arms), axes
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Cross product along axis 1; np.cross spends most of its time on checks for few rows."""
+    product = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    product[:, 0] = a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1]
+    product[:, 1] = a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2]
+    product[:, 2] = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    return product

@@ -67,7 +67,7 @@ def _errors(frames: arm.Frames, points: Array, normals: Array, length: float) ->
     rotation = frames.rotations[5]
     move = points - arm.tip(frames, length)
     axis = rotation[:, :, 2]
-    turn = np.cross(axis, -normals)
+    turn = arm.cross(axis, -normals)
     cosine = -np.einsum("pi,pi->p", axis, normals)
     sine = np.linalg.norm(turn, axis=1)
     tilt = np.arctan2(sine, cosine)

@@ -53,7 +53,8 @@ def choose_placement(tool: Tool, samples: list[Samples], cloud: Cloud, radius: f
     score = reached.mean(axis=1) + 0.5 * np.quantile(np.where(reached, margin, 0.0), 0.1, axis=1)
     poses = solution.q.reshape(len(places), -1, 6)
     best, best_score = places[0], -np.inf
-    by_side = [[k for k in np.argsort(-score, kind="stable") if places[k].yaw == yaw][:CHECKED] for yaw in sorted({p.yaw for p in places})]
+    ranked = np.argsort(-score, kind="stable").tolist()
+    by_side = [[k for k in ranked if places[k].yaw == yaw][:CHECKED] for yaw in sorted({p.yaw for p in places})]
     for k in (k for side in by_side for k in side):
         touch = deepest_touch(poses[k][reached[k]][::2], places[k], cloud) if reached[k].any() else None
         total = float(score[k]) - (0.3 + min(touch.depth, 0.1) if touch else 0.0)

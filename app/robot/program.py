@@ -184,17 +184,26 @@ def write_program(plans: list[RegionPlan], parameters: RobotParameters) -> Progr
                 _transfer(program, step, plan.region if number else -1, parameters)
             entry = retime(step.entry_q, step.entry.points, step.entry.normals, parameters.transfer_speed / 2, DT)
             program.add(entry, 0.0, FREE, plan.region)
-            touch = [np.stack([first[-1], last[0]]) for first, last in (
-                (step.entry_q, step.q), (step.entry.points, step.sweep.points), (step.entry.normals, step.sweep.normals))]  # fmt: skip
+            touch = _joined(step.entry_q, step.entry, step.q[:1], _first(step.sweep))
             program.add(retime(*touch, TOUCH_SPEED, DT), 0.0, FREE, plan.region)
             program.hold(down, TOUCHING, plan.region)
             sweep = retime(step.q, step.sweep.points, step.sweep.normals, parameters.tip_speed, DT)
             program.add(sweep, parameters.force_n, SWEEPING, plan.region)
             program.hold(ease, TOUCHING, plan.region)
-            leave = [np.concatenate([a[-1:], b]) for a, b in (
-                (step.q, step.leave_q), (step.sweep.points, step.leave.points), (step.sweep.normals, step.leave.normals))]  # fmt: skip
+            leave = _joined(step.q, step.sweep, step.leave_q, step.leave)
             program.add(retime(*leave, parameters.transfer_speed / 2, DT), 0.0, FREE, plan.region)
     return program
+
+
+def _first(stroke: Stroke) -> Stroke:
+    return Stroke(stroke.points[:1], stroke.normals[:1])
+
+
+def _joined(q: Array, stroke: Stroke, after_q: Array, after: Stroke) -> tuple[Array, Array, Array]:
+    """Joint angles, points and normals from the last waypoint of `stroke` through all of `after`."""
+    pairs = ((q, after_q), (stroke.points, after.points), (stroke.normals, after.normals))
+    joined = [np.concatenate([last[-1:], following]) for last, following in pairs]
+    return joined[0], joined[1], joined[2]
 
 
 def _transfer(program: Program, step: Pass, region: int, parameters: RobotParameters) -> None:
