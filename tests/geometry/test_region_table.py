@@ -129,6 +129,12 @@ def test_surplus_length_is_read_as_the_authors_do_and_named():
     assert table.tool.graph.shared[0].tolist() == pytest.approx([0, 0, 5 / 6.5, 0])
 
 
+def test_a_neighbour_listed_twice_counts_its_last_length_twice():
+    """As in the authors' code: 0.5 and 1 count as 1 and 1."""
+    graph = synthetic('"O,x,O,x,d,x,a","2,2,2,2"', '"O,x,O,x,d,x,a,a","2,2,2,0.5,1"').tool.graph
+    assert graph.shared[1].tolist() == pytest.approx([2 / 8, 0, 0, 2 / 8])
+
+
 @pytest.mark.parametrize(
     ("old", "new", "row", "column", "value"),
     [
