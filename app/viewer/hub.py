@@ -42,7 +42,7 @@ class Hub:
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
         """Listen for changes; called on the loop that serves the routes."""
         self._loop = loop
-        self._unsubscribe = self._actions.subscribe(lambda event: loop.call_soon_threadsafe(self._on_event, event))
+        self._unsubscribe = self._actions.subscribe(self._told)
         self._reaper = loop.create_task(self._reap(), name="viewer reaper")
 
     def close(self) -> None:
@@ -141,6 +141,11 @@ class Hub:
         """Put away the views nobody has looked at for long."""
         for view in [view for view in self._views.values() if not view.stops and now - view.last_seen > IDLE_SECONDS]:
             self._drop(view.sid)
+
+    def _told(self, event: Any) -> None:
+        """Called on the store's thread."""
+        if self._loop is not None and not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._on_event, event)
 
     def _on_event(self, event: Any) -> None:
         """Have the views concerned by a stored change look at their rows again."""

@@ -77,7 +77,7 @@ def viewer_page() -> tuple[bytes, bytes]:
 
 def installed_page() -> Path:
     """The single file viser's client was built into."""
-    return Path(viser.__file__).parent / "client" / "build" / "index.html"
+    return Path(str(viser.__file__)).parent / "client" / "build" / "index.html"
 
 
 def _ground(theme: Theme) -> str:

@@ -1,6 +1,7 @@
 """The viser side of a view: its server, lights, grid, part, labels and outlines."""
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Coroutine
+from typing import Any
 
 import numpy as np
 import viser
@@ -123,7 +124,7 @@ class Stage:
             name, vertices, faces, color=colour, side="double", flat_shading=flat_shading, cast_shadow=False, receive_shadow=False
         )
 
-    def _clicked(self, region: int) -> Callable[[object], Awaitable[None]]:
+    def _clicked(self, region: int) -> Callable[[object], Coroutine[Any, Any, None]]:
         async def clicked(_event: object) -> None:  # async: viser keeps these in order; plain callbacks overtake each other
             await self._on_click(region)
 

@@ -8,9 +8,9 @@ import asyncio
 import contextlib
 import logging
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -130,12 +130,13 @@ class View:
         self.submit(Pick(region))
 
     def _add_hotkeys(self) -> None:
-        for label, name, modifier in (("Undo", "undo", "cmd/ctrl"), ("Redo", "redo", "cmd/ctrl+shift")):
-            self.server.gui.add_command(label, hotkey="Z", modifier=modifier).on_trigger(self._triggered(Command(name)))
+        add = self.server.gui.add_command
+        add("Undo", hotkey="Z", modifier="cmd/ctrl").on_trigger(self._triggered(Command("undo")))
+        add("Redo", hotkey="Z", modifier="cmd/ctrl+shift").on_trigger(self._triggered(Command("redo")))
         for letter in LETTERS:
-            self.server.gui.add_command(f"Region {letter}", hotkey=letter).on_trigger(self._triggered(Letter(letter)))
+            add(f"Region {letter}", hotkey=letter).on_trigger(self._triggered(Letter(letter)))
 
-    def _triggered(self, command: Task) -> Callable[[object], Awaitable[None]]:
+    def _triggered(self, command: Task) -> Callable[[object], Coroutine[Any, Any, None]]:
         async def triggered(_event: object) -> None:
             self.submit(command)
 
