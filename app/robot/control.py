@@ -99,12 +99,13 @@ class Runner:
         model, data, tip = self._model, self._data, self._tcp
         for k in range(first, last):
             data.ctrl[:6] = self._targets(k) + self._inertia(k)
+            if k % self._every == 0:  # after a step, poses still belong to the joint angles before it
+                self._joints[k // self._every] = data.qpos[:6]
             mujoco.mj_step(model, data)
             self._tip[k] = data.site_xpos[tip]
             if k % self._every == 0:
                 row = k // self._every
                 self._positions[row], self._orientations[row] = data.xpos[self._bodies], data.xquat[self._bodies]
-                self._joints[row] = data.qpos[:6]
 
     def _inertia(self, k: int) -> Array:
         """Change of the servo targets that yields the torque the planned acceleration needs."""

@@ -11,6 +11,7 @@ from app.robot.raster import Samples
 
 DISTANCES = (0.5, 0.62, 0.75, 0.9)  # m from the middle of the tool to the base
 HEIGHTS = (-0.35, -0.15, 0.05)  # m of the base above the middle of the surface
+STEP_BACK = 0.3  # m farther from a tool that is larger than the distances above
 KEEP_OFF = 0.15  # m between base and the tool's box in plan view
 LIFT = 0.06  # m above the surface that must be reached too
 PER_REGION = 4  # samples per region
@@ -26,7 +27,7 @@ def candidates(tool: Tool) -> list[Placement]:
         yaw = side * np.pi / 2
         away = np.array([np.cos(yaw), np.sin(yaw), 0.0]).round()
         nearest = float(half[:2] @ np.abs(away[:2])) + KEEP_OFF
-        for distance in sorted({max(d, nearest) for d in DISTANCES}):
+        for distance in sorted({max(d, nearest) for d in (*DISTANCES, nearest + STEP_BACK)}):
             for height in HEIGHTS:
                 places.append(Placement(middle * [1, 1, 0] + away * distance + [0, 0, middle[2] + height], yaw))
     return places

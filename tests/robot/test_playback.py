@@ -101,10 +101,10 @@ def test_bytes_of_another_format_are_refused(playback, monkeypatch):
 
 
 def test_a_region_out_of_reach_is_named_and_the_rest_is_done():
-    """Two patches 2.6 m apart: only one can be in reach of any base position."""
+    """Two patches 4 m apart: only one can be in reach of any base position."""
     near = block(flat, size=(0.12, 0.12), columns=1, cell=0.02)
     k = len(near.mesh.vertices)
-    vertices = np.concatenate([near.mesh.vertices, near.mesh.vertices + np.array([2.6, 0, 0])])
+    vertices = np.concatenate([near.mesh.vertices, near.mesh.vertices + np.array([4.0, 0, 0])])
     faces = np.concatenate([near.mesh.faces, near.mesh.faces + k]).astype(np.int32)
     labels = np.concatenate([near.labels, np.where(near.labels == 0, 1, -1)]).astype(np.int32)
     playback = simulate(tool_from(Mesh(vertices, faces), labels), (0, 1), RobotParameters())

@@ -27,7 +27,7 @@ def test_tip_and_joints_keep_their_speeds():
 def test_a_slow_joint_slows_the_tip():
     q, points, normals = zigzag()
     timed = retime(q * 30, points, normals, 0.1, DT)
-    assert (np.abs(np.diff(timed.q, axis=0)) / DT / arm.SPEED).max() < SPEED_SHARE * 1.05
+    assert (np.abs(np.diff(timed.q, axis=0)) / DT / arm.SPEED).max() < 1.0
     assert len(timed.q) > 3 * len(retime(q, points, normals, 0.1, DT).q)
 
 
