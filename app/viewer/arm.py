@@ -9,6 +9,7 @@ from app.viewer.palette import Rgb, rgb, theme
 from app.viewer.picture import Progress
 
 LIGHT_BODIES = frozenset({"upper arm", "forearm"})
+ROOM = 0.62  # share of the arm's reach around the tool that the camera shows
 REACH_SAMPLES = 200  # poses looked at to find the room the arm needs
 
 
@@ -31,10 +32,16 @@ def progress_at(playback: Playback, time: float) -> Progress:
     return Progress(order, sum(region in begun for region in order), here if here >= 0 else None, troubled=troubled)
 
 
-def room_needed(playback: Playback) -> Array:
-    """Points (K, 3) the bodies' origins pass through, for the camera."""
+def room_needed(playback: Playback, middle: Array) -> Array:
+    """Points (K, 3) the camera must show too: where the bodies pass, drawn in towards the tool so that the tool stays large."""
     every = max(1, len(playback.times) // REACH_SAMPLES)
-    return np.asarray(playback.positions[::every], dtype=float).reshape(-1, 3)
+    return middle + ROOM * (np.asarray(playback.positions[::every], dtype=float).reshape(-1, 3) - middle)
+
+
+def ground(playback: Playback) -> float:
+    """Height of the lowest point of the robot's base, metres."""
+    vertices = np.asarray(playback.body_meshes[0][0], dtype=float)
+    return float(playback.positions[0, 0, 2] + vertices[:, 2].min())
 
 
 class Arm:

@@ -15,7 +15,7 @@ from app.viewer.picture import Picture, RegionLook
 from app.viewer.projection import Camera, label_points
 
 LIGHT_FROM = np.array([-0.45, -0.6, 1.15])  # upper left, in front
-PLATE_SCALE = 1.35  # of viser's 12 px em
+PLATE, SMALL_PLATE = 1.35, 0.9  # of viser's 12 px em; small beside the robot, where the tool is small too
 LETTER_HEIGHT = 0.036  # of the part's diagonal
 EDGE_WIDTH, OUTLINE_WIDTH, CASING_WIDTH = 2.0, 4.5, 7.5  # px; shaders.py tells them apart by these
 LIFT, LABEL_LIFT = 0.001, 0.012  # above the surface, of the part's diagonal
@@ -50,7 +50,7 @@ class Stage:
         self._rims: tuple[Array, ...] = ()
         self._outlines: list[viser.LineSegmentsHandle] = []
 
-    def build(self, tool: Tool | None, dark: bool) -> None:
+    def build(self, tool: Tool | None, dark: bool, with_arm: bool = False) -> None:
         """Replace whatever is shown by the tool, not painted yet."""
         scene, colours = self.server.scene, theme(dark)
         with self.server.atomic():
@@ -61,7 +61,7 @@ class Stage:
             if tool is not None:
                 self._add_floor(tool, colours)
                 self._add_part(tool, colours)
-                self._add_labels(tool, dark)
+                self._add_labels(tool, dark, SMALL_PLATE if with_arm else PLATE)
         self.server.flush()
 
     def paint(self, picture: Picture) -> None:
@@ -130,13 +130,13 @@ class Stage:
 
         return clicked
 
-    def _add_labels(self, tool: Tool, dark: bool) -> None:
+    def _add_labels(self, tool: Tool, dark: bool, plate: float) -> None:
         span = size(tool)
         normals = np.array([region.normal for region in tool.regions]).reshape(-1, 3)
         for region, point in enumerate(label_points(tool) + LABEL_LIFT * span * normals):
             self._labels.append(
                 self.server.scene.add_label(
-                    f"/plates/r{region:03d}", "", position=point, visible=False, anchor="center-center", font_screen_scale=PLATE_SCALE,
+                    f"/plates/r{region:03d}", "", position=point, visible=False, anchor="center-center", font_screen_scale=plate,
                     depth_test=True,
                 )
             )  # fmt: skip

@@ -230,10 +230,11 @@ class View:
         if not moved and dark == self._dark:
             return
         self._dark = dark
-        self.stage.build(tool, dark)
+        self.stage.build(tool, dark, with_arm=playback is not None)
         self._arm = Arm(self.server, playback, dark) if playback is not None else None
         if tool is not None and moved:
-            self.stage.place_camera(camera_for(tool, room_needed(playback) if playback is not None else None))
+            middle = tool.mesh.vertices.mean(0)
+            self.stage.place_camera(camera_for(tool, room_needed(playback, middle) if playback is not None else None))
 
     def _recording(self, playback_id: str) -> Playback | None:
         """The robot's recording; None while it is still being computed, which its page tells."""
