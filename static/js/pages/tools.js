@@ -65,7 +65,7 @@ function dismiss(entry) {
 
 function uploadRow(entry) {
   if (entry.fault) {
-    return h("div.upload-row", {}, h("div.note.bad", { role: "alert" }, icon("warn"), h("span", {}, h("b.strong", {}, entry.name), ": ", entry.fault)),
+    return h("div.upload-row", {}, h("div.note.bad", { role: "alert" }, icon("warn"), h("span", {}, entry.fault.includes(entry.name) ? null : [h("b.strong", {}, entry.name), ": "], entry.fault)),
       h("button.btn.quiet.small", { type: "button", style: { "justify-self": "start" }, onclick: () => dismiss(entry) }, "Dismiss"));
   }
   const percent = Math.round(entry.fraction * 100);
