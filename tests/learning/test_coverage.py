@@ -156,3 +156,30 @@ def test_other_feature_sets_are_left_out(tools):
 def test_unknown_factor_is_refused(tools):
     with pytest.raises(UnknownFeature, match="colour"):
         coverage(tools, [], (Interaction("height", "colour"),))
+
+
+def test_p_value_of_a_cell_by_hand():
+    """Five equal steps in one cell: each factor tested with three levels there gives 3^-4; corrected for their number, judged at 0.05."""
+    tool = problem_for(grid_graph(3, 3, 2))
+    order = tuple(range(9))
+    report = coverage([tool], [(0, order)] * 5, DEFAULT_INTERACTIONS)
+    sampled = sample_transitions(tool)
+    levels = report.thresholds
+    grid, shown = levels.of(sampled.values), levels.of(sequence_values(tool, order))
+    tested = [f for f in range(len(levels.keys)) if len(set(grid[:, f].tolist())) == 3]
+    axes = [levels.keys.index(k) for k in ("height", "curvature")]
+    checked = 0
+    for row in range(3):
+        for column in range(3):
+            cell = report.tables[0].cells[row][column]
+            inside = shown[(shown[:, axes[0]] == row) & (shown[:, axes[1]] == column)]
+            if len(inside) != 1:
+                continue
+            there = grid[(grid[:, axes[0]] == row) & (grid[:, axes[1]] == column)]
+            kinds = [len({*there[:, f].tolist(), int(inside[0, f])}) for f in tested if f not in axes]
+            tests = [k * k**-5.0 for k in kinds if k > 1]
+            assert cell.count == 5
+            assert cell.p_value == pytest.approx(min(1.0, min(tests) * len(tests)))
+            assert cell.state == ("captured" if cell.p_value >= 0.05 else "uneven")
+            checked += 1
+    assert checked
