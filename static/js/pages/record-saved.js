@@ -39,7 +39,7 @@ export class SavedList {
   }
 
   row(item) {
-    const facts = [item.tool_name, item.source === "recorded" && item.author ? `by ${item.author}` : (SOURCES[item.source] ?? item.source), ago(item.created_at), item.superseded_by ? "replaced by a newer one" : ""].filter(Boolean).join(", ");
+    const facts = [item.name === item.tool_name ? "" : item.tool_name, item.source === "recorded" && item.author ? `by ${item.author}` : (SOURCES[item.source] ?? item.source), ago(item.created_at), item.superseded_by ? "replaced by a newer one" : ""].filter(Boolean).join(", ");
     const name = renameable(item.name, "demonstration", async (wanted) => {
       await patch(`/demonstrations/${item.id}`, { name: wanted }, item.version);
       await this.load();
