@@ -54,12 +54,9 @@ def rename_all(api: Api, other: dict[str, Any], mine: dict[str, Any], names: lis
             api.call("PATCH", f"/projects/{project['id']}", 200, json={"name": name}, headers=headers)
 
 
-def test_an_unknown_project_has_no_stream(live_api: Api) -> None:
-    check_problem(live_api.client.get("/api/v1/events", params={"project": "nothing"}), 404, "NotFound")
-
-
 def test_streams_end_when_the_server_stops(live_server: LiveServer, live_api: Api) -> None:
     """SIGTERM with an open stream: the stream ends by itself, not by the end of the grace period."""
+    check_problem(live_api.client.get("/api/v1/events", params={"project": "nothing"}), 404, "NotFound")
     with live_api.client.stream("GET", "/api/v1/events") as response:
         lines = response.iter_lines()
         assert next(lines).startswith(":")
