@@ -41,7 +41,10 @@ class Progress:
 
 def paint(progress: Progress, names: Sequence[str], tints: Sequence[int], dark: bool) -> Picture:
     """The picture of a tool with regions `names`, whose undone regions take the tints of the given numbers."""
-    colours, place = ramp(len(names), dark), {region: k for k, region in enumerate(progress.sequence[: progress.done])}
+    colours, place = (
+        ramp(max(len(names), len(progress.sequence)), dark),
+        {region: k for k, region in enumerate(progress.sequence[: progress.done])},
+    )
     tint = theme(dark).region_tints
     looks: list[RegionLook] = []
     for region, name in enumerate(names):

@@ -50,8 +50,8 @@ class Stage:
         self._rims: tuple[Array, ...] = ()
         self._outlines: list[viser.LineSegmentsHandle] = []
 
-    def build(self, tool: Tool | None, dark: bool, with_arm: bool = False) -> None:
-        """Replace whatever is shown by the tool, not painted yet."""
+    def build(self, tool: Tool | None, dark: bool, ground: float | None = None) -> None:
+        """Replace whatever is shown by the tool, not painted yet. Beside a robot it stands on a block on the ground (metres)."""
         scene, colours = self.server.scene, theme(dark)
         with self.server.atomic():
             scene.reset()
@@ -59,9 +59,9 @@ class Stage:
             self.server.gui.configure_theme(dark_mode=dark, show_logo=False, show_share_button=False)
             self._add_lights(colours)
             if tool is not None:
-                self._add_floor(tool, colours)
+                self._add_floor(tool, colours, ground)
                 self._add_part(tool, colours)
-                self._add_labels(tool, dark, SMALL_PLATE if with_arm else PLATE)
+                self._add_labels(tool, dark, PLATE if ground is None else SMALL_PLATE)
         self.server.flush()
 
     def paint(self, picture: Picture) -> None:
@@ -94,14 +94,22 @@ class Stage:
         scene.add_light_ambient("/light/everywhere", intensity=np.pi * shade)
         scene.add_light_directional("/light/upper_left", intensity=np.pi * full / direction[2], position=tuple(direction * 100))
 
-    def _add_floor(self, tool: Tool, colours: Theme) -> None:
+    def _add_floor(self, tool: Tool, colours: Theme, ground: float | None) -> None:
         low, high = tool.mesh.vertices.min(0), tool.mesh.vertices.max(0)
         span, grey = size(tool), rgb(colours.grid)
-        x, y = (low[:2] + high[:2]) / 2
+        (x, y), bottom = (low[:2] + high[:2]) / 2, low[2]
+        if ground is not None and ground < bottom:
+            width, depth = 0.92 * (high - low)[:2]
+            block = (float(width), float(depth), float(bottom - ground))
+            middle = (x, y, (ground + bottom) / 2)
+            self.server.scene.add_box(
+                "/block", dimensions=block, color=rgb(colours.body), cast_shadow=False, receive_shadow=False, position=middle
+            )
+            bottom = ground
         self.server.scene.add_grid(
             "/floor", width=8 * span, height=8 * span, cell_size=span / 7, section_size=span / 7, cell_color=grey, section_color=grey,
             cell_thickness=0.8, section_thickness=0.0, fade_distance=7 * span, fade_strength=1.0, shadow_opacity=0.0,
-            position=(x, y, low[2] - 0.001 * span),
+            position=(x, y, bottom - 0.001 * span),
         )  # fmt: skip
 
     def _add_part(self, tool: Tool, colours: Theme) -> None:

@@ -18,7 +18,7 @@ from app.errors import AppError
 from app.geometry.tool import Tool
 from app.robot.playback import Playback
 from app.viewer.actions import Actions, Json
-from app.viewer.arm import Arm, progress_at, room_needed
+from app.viewer.arm import Arm, ground, progress_at, room_needed
 from app.viewer.palette import tint_choice
 from app.viewer.picture import Progress, draft_progress, paint, sequence_progress
 from app.viewer.projection import camera_for
@@ -99,6 +99,7 @@ class View:
         self._tints: tuple[int, ...] = ()
         self._tool: Tool | None = None
         self._playback: Playback | None = None
+        self._playback_shown: str | None = None
         self._arm: Arm | None = None
         self._clock = Clock()
         self.server = open_server()
@@ -224,20 +225,22 @@ class View:
         tool = self._actions.tool_value(tool_id) if tool_id and mode != "empty" else None
         playback = self._recording(playback_id) if playback_id and mode == "robot" else None
         moved = not same_shape(tool, self._tool) or playback is not self._playback
-        self._tool, self._playback = tool, playback
+        if moved or dark != self._dark:
+            self._tool = None  # nothing to paint on, should the building fail
+            self.stage.build(tool, dark, ground(playback) if playback is not None else None)
+            self._arm = Arm(self.server, playback, dark) if playback is not None else None
         if tool is not None:
             self._tints = tint_choice(tool.graph.neighbour)
-        if not moved and dark == self._dark:
-            return
-        self._dark = dark
-        self.stage.build(tool, dark, with_arm=playback is not None)
-        self._arm = Arm(self.server, playback, dark) if playback is not None else None
-        if tool is not None and moved:
-            middle = tool.mesh.vertices.mean(0)
-            self.stage.place_camera(camera_for(tool, room_needed(playback, middle) if playback is not None else None))
+            if moved:
+                middle = tool.mesh.vertices.mean(0)
+                self.stage.place_camera(camera_for(tool, room_needed(playback, middle) if playback is not None else None))
+        self._tool, self._playback, self._dark = tool, playback, dark
+        self._playback_shown = playback_id
 
     def _recording(self, playback_id: str) -> Playback | None:
         """The robot's recording; None while it is still being computed, which its page tells."""
+        if playback_id == self._playback_shown and self._playback is not None:
+            return self._playback  # recordings never change
         try:
             return self._actions.playback_value(playback_id)
         except AppError:
