@@ -89,6 +89,8 @@ def plan_region(region: int, runs: list[Stroke], placement: Placement, roller: R
         top: Height of the clearance plane, metres in the tool frame.
     """
     planned = sum(len(r.points) for r in runs)
+    if not planned:
+        return RegionPlan(region, (), 0, 0, 0.0, 0.0)
     passes: list[Pass] = []
     reached, miss, tilt = 0, 0.0, 0.0
     start = _start(runs, placement, roller)

@@ -124,3 +124,15 @@ def test_a_region_out_of_reach_is_named_and_the_rest_is_done():
 def test_a_missing_region_is_refused(tool):
     with pytest.raises(IncompleteSequence):
         simulate(tool, (0,), RobotParameters())
+
+
+def test_a_region_too_small_for_the_roller_is_named():
+    """One triangle of 5 mm beside a plain of 20 cm."""
+    tool = block(flat, size=(0.2, 0.2), columns=1, cell=0.005)
+    labels = tool.labels.copy()
+    labels[0] = 1
+    playback = simulate(tool_from(tool.mesh, labels), (1, 0), RobotParameters())
+    small, large = playback.region_reports
+    assert small.problems == (("reach", "Region B is too small for the roller."),)
+    assert small.covered == 0
+    assert large.covered > 0.95
