@@ -62,13 +62,13 @@ export async function startCards({ project, runs, onStarted }) {
       h("p", {}, count ? `Learns from ${plural(count, "demonstration")} what an order should cost, and asks you whether other orders would be just as good.` : "Learns from your demonstrations. There is none yet."),
       startButton(project.id, "performance", performance, !learned, learned ? "Learn again" : "Start learning", empty, onStarted),
       count ? performance.node : h("a.btn", { href: pageAddress(project.id, "record") }, "Record a demonstration")),
-    h("section.card.kind", {}, h("h2", {}, "Which good order you like better"),
-      h("p", {}, "Some orders are equally good, but one starts or ends where it suits you better. Asks you which of two you prefer."),
+    h("section.card.kind", {}, h("h2", {}, "Which good order is less effort"),
+      h("p", {}, "Some orders are equally good, but one starts or ends where it suits you better. Asks you which of two is less effort."),
       startButton(project.id, "effort", effort, learned, "Start asking", empty ?? before, onStarted), learned ? effort.node : null));
 }
 
 const OUTCOMES = {
-  converged: (run) => ({ tone: "ok", mark: "shield", title: run.kind === "performance" ? "Learned: every demonstration is explained" : "Learned: your taste is settled", text: `${plural(run.asked, "question")} asked, ${run.answered} answered.` }),
+  converged: (run) => ({ tone: "ok", mark: "shield", title: run.kind === "performance" ? "Learned: every demonstration is explained" : "Learned: which order is less effort", text: `${plural(run.asked, "question")} asked, ${run.answered} answered.` }),
   stalled: () => ({ tone: "warn", mark: "warn", title: "Nothing is left to ask", text: "Every order that was shown is as good as yours by your own answers. You can take what was learned, or record one more demonstration." }),
   infeasible: () => ({ tone: "bad", mark: "warn", title: "Some answers or demonstrations contradict each other", text: "No weights can satisfy all of them." }),
   failed: () => ({ tone: "bad", mark: "warn", title: "The run stopped with an error", text: "It can go on from where it was saved last." }),

@@ -12,7 +12,7 @@ import { outcomeCard, startCards } from "./teach-start.js";
 import { Training } from "./teach-training.js";
 
 const ACTIVE = ["waiting_for_expert", "training", "queued", "cancelling"];
-const KIND_WORDS = { performance: "what makes an order good", effort: "which good order you like better" };
+const KIND_WORDS = { performance: "what makes an order good", effort: "which good order is less effort" };
 const STATE_WORDS = { queued: "about to start", training: "learning", waiting_for_expert: "waiting for you", converged: "learned", stalled: "nothing left to ask", infeasible: "contradictions", failed: "stopped with an error", cancelling: "stopping", cancelled: "stopped" };
 
 const shell = await boot();
@@ -146,12 +146,12 @@ async function drawEnded() {
   if (run.state === "converged" && run.kind === "performance") cards.querySelectorAll(".btn.primary").forEach((button) => button.classList.remove("primary"));
   else if (["stalled", "failed", "converged"].includes(run.state)) cards.querySelectorAll(".btn.primary").forEach((button) => button.classList.remove("primary"));
   training.node.open = false;
-  fill(shell.main, head(`Learned from ${plural(shell.project.counts.demonstrations, "demonstration")}.`), outcomeCard({ run, project: shell.project, act: runAction }), cards, training.node, history());
+  fill(shell.main, head(`The last run used ${plural(run.tools.length, "demonstration")}.`), outcomeCard({ run, project: shell.project, act: runAction }), cards, training.node, history());
 }
 
 function history() {
   if (state.runs.length < 2) return null;
-  const row = (run) => h("tr", {}, h("td", {}, run.kind === "performance" ? "What makes an order good" : "Which one you like better"), h("td", {}, STATE_WORDS[run.state] ?? run.state), h("td.num", {}, plural(run.answered, "answer")), h("td.num.muted", {}, ago(run.created_at)),
+  const row = (run) => h("tr", {}, h("td", {}, run.kind === "performance" ? "What makes an order good" : "Which one is less effort"), h("td", {}, STATE_WORDS[run.state] ?? run.state), h("td.num", {}, plural(run.answered, "answer")), h("td.num.muted", {}, ago(run.created_at)),
     h("td", {}, run.policy_id ? h("a", { href: pageAddress(shell.projectId, "policy", { policy: run.policy_id }) }, "policy") : ""));
   return h("section.card", { style: { flex: "none" } }, h("div.card-head", {}, h("h2", {}, "All runs")), h("table.run-list", {}, h("thead", {}, h("tr", {}, h("th", {}, "Learned"), h("th", {}, "State"), h("th.num", {}, "Answers"), h("th.num", {}, "Started"), h("th", {}, ""))), h("tbody", {}, state.runs.map(row))));
 }
