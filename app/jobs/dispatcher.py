@@ -60,6 +60,7 @@ class Jobs:
 
     def start(self) -> None:
         """Put back what a stopped server left running, then work."""
+        self._closing, self._mailbox = False, queue.SimpleQueue()
         self.store.write(_requeue)
         self._runner = runner_for(self._settings.executor, self._progress, self._warm_up)
         self._unsubscribe = self.store.subscribe(self._heard)

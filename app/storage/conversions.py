@@ -16,7 +16,7 @@ REGION_WORDS = ("name", "description", "kind")
 REGION_NUMBERS = ("area", "curvature")
 
 
-def pack(words: Any, **arrays: np.ndarray) -> bytes:
+def pack(words: Any, **arrays: Any) -> bytes:
     """An .npz; the same values give the same bytes."""
     file = io.BytesIO()
     text = np.frombuffer(json.dumps(words).encode(), np.uint8)

@@ -147,8 +147,8 @@ class Draft(SQLModel, table=True):
     segmentation_id: str = owned("segmentation.id")
     sequence: list[int] = json_column()
     click_times: list[float] = json_column()  # seconds since the epoch, one per region
-    past: list[list[list[float]]] = json_column()  # [[sequence, click_times], ...]
-    future: list[list[list[float]]] = json_column()
+    past: list[list[Any]] = json_column()  # [[sequence, click_times], ...]
+    future: list[list[Any]] = json_column()
     updated_at: str = Field(default_factory=now)
 
 
