@@ -5,6 +5,7 @@ import weakref
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from enum import Enum
+from typing import Any
 
 from fastapi import APIRouter, FastAPI, Request
 from fastapi.responses import FileResponse, Response
@@ -39,7 +40,7 @@ STATIC = ROOT / "static"
 HOSTS = ("127.0.0.1", "localhost", "::1")
 NOUNS = (projects, tools, drafts, demonstrations, coverage, runs, queries, policies, playbacks, sessions, events)
 DESCRIPTION = "Learns in which order an expert works on the regions of a part, and shows a robot doing it on another part."
-PROBLEMS = {
+PROBLEMS: dict[int | str, dict[str, Any]] = {
     "4XX": {"model": errors.Problem, "description": "Refused; the body says why and what is accepted."},
     "5XX": {"model": errors.Problem, "description": "The server failed."},
 }
