@@ -18,6 +18,7 @@ NEAR_LIMIT = np.radians(5.0)
 NEAR_SINGULAR = 0.02  # smallest singular value (m/rad, tilt weighted); the home pose has 0.15
 PRESSED = 0.25  # share of the wanted force from which the roller counts as working
 LOST_N, LOST_SHARE = 1.0, 0.02
+PUSHED_OFF_MM = 3.0  # measured distance from the path from which something other than control is in the way
 COVERED_ENOUGH = 0.9
 POSES_CHECKED = 60  # per region for collisions
 
@@ -106,12 +107,17 @@ def region_report(
     problems, lost = list(found), float((trace.force[sweeping] < LOST_N).mean())
     if lost > LOST_SHARE:
         problems.append(("contact", f"The roller loses contact on {round(100 * lost)} % of region {name}."))
+    away = float(1000 * off_path(commands, trace)[touching].max())
+    if away > PUSHED_OFF_MM:
+        problems.append(
+            ("contact", f"The roller is pushed {away:.0f} mm off its path in region {name}: it does not fit between the surfaces.")
+        )
     if covered < COVERED_ENOUGH and plan.reached == plan.planned:
         why = "it is narrow or strongly curved for the roller"
         problems.append(("coverage", f"Only {100 * covered:.0f} % of region {name} is covered: {why}."))
     return RegionReport(
         plan.region, float(when[0]), float(when[-1] + DT), float(np.sqrt((error**2).mean())), float(trace.force[touching].max()),
-        float(1000 * off_path(commands, trace)[touching].max()), covered, tuple(problems),
+        away, covered, tuple(problems),
     )  # fmt: skip
 
 
