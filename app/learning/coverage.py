@@ -204,7 +204,8 @@ class _Study:
             text = self.words(k, cell)
             tools = self.places(k, cell)
             cells.append(Cell(j.state, j.count, j.p_value, tools, text, _advice(j.state, text, tools, waiting)))
-        return InteractionTable(self.interactions[k], *self.phrases[k], LEVEL_WORDS, LEVEL_WORDS, tuple(tuple(cells[r : r + 3]) for r in (0, 3, 6)))
+        rows = tuple(tuple(cells[r : r + 3]) for r in (0, 3, 6))
+        return InteractionTable(self.interactions[k], *self.phrases[k], LEVEL_WORDS, LEVEL_WORDS, rows)
 
     def words(self, k: int, cell: int) -> str:
         row, column = divmod(cell, 3)

@@ -43,7 +43,7 @@ class Studio:
         """Page pixels (N, 2) of every region's label in the first 3D frame."""
         box = self.page.locator(".view3d iframe").first.bounding_box()
         assert box is not None
-        return project(label_points(tool), camera_for(tool), box["width"], box["height"]) + [box["x"], box["y"]]
+        return project(label_points(tool), camera_for(tool), box["width"], box["height"]) + np.array([box["x"], box["y"]])
 
     def colour(self, pixel: np.ndarray) -> np.ndarray:
         """RGB just left of a label."""
