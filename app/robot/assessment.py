@@ -1,5 +1,7 @@
 """What a person should know of each region: measured force and path, coverage, and problems in plain sentences."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,7 +20,8 @@ NEAR_LIMIT = np.radians(5.0)
 NEAR_SINGULAR = 0.02  # smallest singular value (m/rad, tilt weighted); the home pose has 0.15
 PRESSED = 0.25  # share of the wanted force from which the roller counts as working
 LOST_N, LOST_SHARE = 1.0, 0.02
-PUSHED_OFF_MM = 3.0  # measured distance from the path from which something other than control is in the way
+HARDEST, ROUGHEST = 1.35, 0.10  # shares of the wanted force: highest measured force, root mean square of its error while sweeping
+PUSHED_OFF_MM = 2.0  # measured distance from the path from which something other than control is in the way
 COVERED_ENOUGH = 0.9
 POSES_CHECKED = 60  # per region for collisions
 
@@ -103,22 +106,41 @@ def region_report(
     when = np.flatnonzero(mine) * DT
     touching, sweeping = mine & (commands.phase != FREE), mine & (commands.phase == SWEEPING)
     error = trace.force[sweeping] - commands.wanted[sweeping]
-    covered = coverage(samples, *_pressed(commands, trace, touching), roller.width)
+    report = RegionReport(
+        plan.region, float(when[0]), float(when[-1] + DT), float(np.sqrt((error**2).mean())), float(trace.force[mine].max()),
+        float(1000 * off_path(commands, trace)[touching].max()),
+        coverage(samples, *_pressed(commands, trace, touching), roller.width), (),
+    )  # fmt: skip
     problems, lost = list(found), float((trace.force[sweeping] < LOST_N).mean())
     if lost > LOST_SHARE:
         problems.append(("contact", f"The roller loses contact on {round(100 * lost)} % of region {name}."))
-    away = float(1000 * off_path(commands, trace)[touching].max())
-    if away > PUSHED_OFF_MM:
-        problems.append(
-            ("contact", f"The roller is pushed {away:.0f} mm off its path in region {name}: it does not fit between the surfaces.")
-        )
-    if covered < COVERED_ENOUGH and plan.reached == plan.planned:
-        why = "it is narrow or strongly curved for the roller"
-        problems.append(("coverage", f"Only {100 * covered:.0f} % of region {name} is covered: {why}."))
-    return RegionReport(
-        plan.region, float(when[0]), float(when[-1] + DT), float(np.sqrt((error**2).mean())), float(trace.force[touching].max()),
-        away, covered, tuple(problems),
-    )  # fmt: skip
+    problems += measured_problems(name, report, float(commands.wanted[touching].max()), plan.reached == plan.planned)
+    return replace(report, problems=tuple(problems))
+
+
+def measured_problems(name: str, report: RegionReport, wanted: float, all_reached: bool) -> list[Problem]:
+    """What the measured numbers of a region that was worked say against it.
+
+    Args:
+        name: Of the region.
+        report: Its measured numbers; the problems in it are not read.
+        wanted: Force asked for, N.
+        all_reached: Whether the arm could follow every stroke; if not, that is told elsewhere as the reason of poor coverage.
+    """
+    problems: list[Problem] = []
+    if report.force_max_n > HARDEST * wanted:
+        pressed = f"the roller pressed with {report.force_max_n:.0f} N where {wanted:g} N were wanted"
+        problems.append(("contact", f"Region {name}: {pressed}."))
+    if report.force_rms_n > ROUGHEST * wanted:
+        unsteady = f"the force is unsteady, {report.force_rms_n:.1f} N (root mean square) off the {wanted:g} N wanted"
+        problems.append(("contact", f"Region {name}: {unsteady}."))
+    if report.off_path_max_mm > PUSHED_OFF_MM:
+        pushed = f"the roller is pushed {report.off_path_max_mm:.1f} mm off its path, as where it does not fit between the surfaces"
+        problems.append(("contact", f"Region {name}: {pushed}."))
+    if report.covered < COVERED_ENOUGH:
+        why = ": it is narrow or strongly curved for the roller" if all_reached else ""
+        problems.append(("coverage", f"Only {np.floor(100 * report.covered):.0f} % of region {name} is covered{why}."))
+    return problems
 
 
 def _pressed(commands: Commands, trace: Trace, touching: NDArray[np.bool_]) -> tuple[Array, Array]:

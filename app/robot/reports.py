@@ -28,7 +28,7 @@ class RegionReport:
     start_s: float  # first movement towards the region
     end_s: float  # roller lifted off and back at clearance height
     force_rms_n: float  # root mean square of measured minus commanded force while sweeping
-    force_max_n: float  # highest measured force, touch-down included
+    force_max_n: float  # highest measured force, touch-down and the ways in and out included
     off_path_max_mm: float  # farthest from the planned path in the tangent plane while in contact
     covered: float  # share of the region's area that the pressed roller passed over, 0..1
     problems: tuple[tuple[str, str], ...]  # (kind "reach"|"limit"|"singular"|"collision"|"contact"|"coverage", sentence)
