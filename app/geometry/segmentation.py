@@ -1,29 +1,27 @@
 """Cut a part's working surface into a handful of regions (Sec. V).
 
 CAD faces, where the file has them, or single triangles are merged greedily into planes, cylinders and spheres; the part
-that can be reached from above is kept; what is too small or too much is merged on.
+that can be reached from above is kept; small pieces and holes go to their surroundings, large ones are cut by planes.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from app.errors import InvalidInput, UnreadableMesh
-from app.geometry.cleaning import areas, face_pairs
+from app.geometry.cleaning import face_pairs
 from app.geometry.fitting import AREA, NORMAL_WEIGHT, SIZE, face_sums, fit
 from app.geometry.importing import ImportedPart
 from app.geometry.merging import Integers, build_tree
+from app.geometry.splitting import Surface, connected, split_large
 from app.geometry.tool import Array, Mesh
 from app.geometry.working_surface import reachable
 
 Report = Callable[[float, str], None]
 MOST_TARGET = 60
-LEAST_REGIONS = 6  # fewer primitives than this are split further, as one region leaves nothing to sequence
-SMALL_FACES = 0.1  # a region is only split when no triangle has more than this share of it
+LEAST_REGIONS = 6  # fewer primitives than this are cut further, as one region leaves nothing to sequence
 
 
 def ignore(fraction: float, message: str) -> None:
@@ -36,22 +34,20 @@ class SegmentationParameters:
 
     target: int | None = None  # regions wanted; None: as many as the tolerance needs, at most `most`
     tolerance: float = 1e-3  # allowed RMS distance to the primitives / diagonal
-    minimum_area: float = 0.005  # smaller shares of the working surface are merged with a neighbour
+    minimum_area: float = 0.02  # smaller shares of the working surface (holes) go to a neighbour, while more than wanted
     most: int = 14  # regions without a target; sequencing is exact well above, people are not
 
 
 @dataclass(frozen=True)
-class _Patches:
-    """Clusters of the working surface."""
+class Cut:
+    """A part cut into regions; it has more triangles than before where planes cut it."""
 
-    sums: Array  # (P, 54)
-    pairs: Integers  # (Q, 2) neighbours
+    part: ImportedPart
+    labels: NDArray[np.int32]  # (F,) region of each face of this part, -1 outside the working surface
 
 
-def segment(
-    part: ImportedPart, parameters: SegmentationParameters, report: Report = ignore
-) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
-    """Region of each face (F,), -1 outside the working surface, and the working surface (F,).
+def segment(part: ImportedPart, parameters: SegmentationParameters, report: Report = ignore) -> Cut:
+    """Find the regions of a part's working surface.
 
     Raises:
         InvalidInput: A parameter is out of range.
@@ -69,12 +65,15 @@ def segment(
     patch = tree.cut(tree.clusters_within(parameters.tolerance))[leaf]
     labels = _working_patches(patch, seen, sums[:, AREA], pairs)
     report(0.85, "Merging small pieces")
-    labels = _merge_small(labels, sums, pairs, parameters.minimum_area)
+    labels = _merge_small(labels, sums, pairs, parameters.minimum_area, parameters.target or 1)
     wanted = parameters.target or parameters.most
     labels = _merge_down(labels, sums, pairs, wanted)
-    labels = _split_up(labels, mesh, pairs, parameters.target or LEAST_REGIONS)
-    report(1.0, f"{labels.max() + 1} regions")
-    return labels.astype(np.int32), labels >= 0
+    report(0.9, "Cutting large pieces")
+    least = min(parameters.target or LEAST_REGIONS, wanted)
+    surface = split_large(Surface(mesh.vertices, mesh.faces.astype(np.int64), part.cad_face, labels), least, wanted)
+    report(1.0, f"{surface.labels.max() + 1} regions")
+    finer = replace(part, mesh=Mesh(surface.vertices, surface.faces.astype(np.int32)), cad_face=surface.cad_face)
+    return Cut(finer, surface.labels.astype(np.int32))
 
 
 def _check(parameters: SegmentationParameters) -> None:
@@ -97,18 +96,10 @@ def _add_up(sums: Array, label: NDArray[np.integer]) -> Array:
     return total
 
 
-def _connected(group: NDArray[np.integer], pairs: Integers) -> Integers:
-    """Number of the connected piece of equal `group` that each face lies in."""
-    same = pairs[group[pairs[:, 0]] == group[pairs[:, 1]]]
-    n = len(group)
-    graph = coo_matrix((np.ones(len(same)), (same[:, 0], same[:, 1])), shape=(n, n))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
-
-
 def _first_clusters(cad_face: NDArray[np.int32], pairs: Integers) -> Integers:
     """Leaf of each face: its CAD face, or the face itself where there is none."""
     alone = cad_face.max(initial=-1) + 1 + np.arange(len(cad_face))
-    return _connected(np.where(cad_face >= 0, cad_face, alone), pairs)
+    return connected(np.where(cad_face >= 0, cad_face, alone), pairs)
 
 
 def _working_patches(patch: Integers, seen: NDArray[np.bool_], area: Array, pairs: Integers) -> Integers:
@@ -135,22 +126,32 @@ def _label_pairs(labels: Integers, pairs: Integers) -> Integers:
     return np.unique(np.sort(both, axis=1), axis=0)
 
 
-def _merge_small(labels: Integers, sums: Array, pairs: Integers, minimum_area: float) -> Integers:
-    """Give every region below the minimum area to the neighbour it fits best; drop it when it has none."""
-    while True:
-        total = _add_up(sums, labels)
-        share = total[:, AREA] / total[:, AREA].sum()
-        small = int(np.argmin(share))
-        if share[small] >= minimum_area or len(share) == 1:
-            return labels
-        touching = _label_pairs(labels, pairs)
-        touching = touching[(touching == small).any(axis=1)]
-        others = touching[touching != small]
+def _merge_small(labels: Integers, sums: Array, pairs: Integers, minimum_area: float, wanted: int) -> Integers:
+    """Give regions below the minimum area, smallest first, to the neighbour they fit best while there are more than wanted.
+
+    A region without a neighbour is dropped from the working surface.
+    """
+    total, touching = _add_up(sums, labels), _label_pairs(labels, pairs)
+    into = np.arange(len(total))
+    alive = np.ones(len(total), bool)
+    while alive.sum() > wanted:
+        area = np.where(alive, total[:, AREA], np.inf)
+        small = int(np.argmin(area))
+        if area[small] >= minimum_area * total[alive, AREA].sum() or alive.sum() == 1:
+            break
+        others = touching[(touching == small).any(axis=1)]
+        others = np.unique(others[others != small])
+        alive[small] = False
         if len(others) == 0:
-            labels = _renumber(np.where(labels == small, -1, labels))
+            into[into == small] = -1
             continue
         extra = [_cost(total[small] + total[o]) - _cost(total[o]) for o in others]
-        labels = _renumber(np.where(labels == small, others[int(np.argmin(extra))], labels))
+        best = int(others[int(np.argmin(extra))])
+        total[best] += total[small]
+        into[into == small] = best
+        touching = np.where(touching == small, best, touching)
+        touching = touching[touching[:, 0] != touching[:, 1]]
+    return _renumber(np.where(labels >= 0, into[labels], -1))
 
 
 def _cost(sums: Array) -> float:
@@ -164,38 +165,3 @@ def _merge_down(labels: Integers, sums: Array, pairs: Integers, wanted: int) -> 
     tree = build_tree(_add_up(sums, labels), _label_pairs(labels, pairs), lambda _: None)
     joined = tree.cut(wanted)
     return np.where(labels >= 0, joined[labels], -1)
-
-
-def _split_up(labels: Integers, mesh: Mesh, pairs: Integers, wanted: int) -> Integers:
-    """Halve the largest region across its long side until `wanted` regions exist or triangles are too coarse."""
-    area = areas(mesh.vertices, mesh.faces)
-    centres = mesh.vertices[mesh.faces].mean(axis=1)
-    closed: set[int] = set()
-    while labels.max() + 1 < wanted:
-        size = np.bincount(labels[labels >= 0], weights=area[labels >= 0])
-        size[list(closed)] = 0
-        largest = int(np.argmax(size))
-        if size[largest] == 0:
-            return labels
-        inside = np.flatnonzero(labels == largest)
-        half = _half(centres[inside], area[inside])
-        trial = labels.copy()
-        trial[inside[half]] = labels.max() + 1
-        pieces = len(np.unique(_connected(trial, pairs)[inside]))
-        if area[inside].max() > SMALL_FACES * size[largest] or pieces != 2:
-            closed.add(largest)
-            continue
-        labels = trial
-    return labels
-
-
-def _half(centres: Array, area: Array) -> NDArray[np.bool_]:
-    """The faces beyond the area median along the longest direction."""
-    offset = centres - np.average(centres, axis=0, weights=area)
-    _, axes = np.linalg.eigh((offset * area[:, None]).T @ offset)
-    along = offset @ axes[:, -1]
-    order = np.argsort(along)
-    beyond = np.cumsum(area[order]) > area.sum() / 2
-    half = np.zeros(len(area), bool)
-    half[order[beyond]] = True
-    return half

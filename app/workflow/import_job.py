@@ -69,9 +69,9 @@ def compute(order: Order, report: Report) -> Result:
         start = LOADED
     else:
         part, start = part_from_bytes(order.part), 0.0
-    labels, _ = segment(part, order.parameters, lambda fraction, message: report(start + (0.95 - start) * fraction, message))
+    cut = segment(part, order.parameters, lambda fraction, message: report(start + (0.95 - start) * fraction, message))
     report(0.95, "Measuring the regions")
-    tool = measure(part.mesh, labels)
+    tool = measure(cut.part.mesh, cut.labels)
     return Result(part_to_bytes(part), tool_to_bytes(tool), tool.n, feature_set_for(tool.graph).name, part.report.lines)
 
 

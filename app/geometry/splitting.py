@@ -1,0 +1,244 @@
+"""Cut large regions into near-equal parts by planes; triangles are split where a plane runs, so borders are straight.
+
+A region is cut in the rectangle that encloses it most tightly: first into rows, then the rows into columns. Every triangle at
+a new vertex is split on both sides of its edge, so a closed solid stays closed.
+
+Paper: Sec. V's regions aren't only primitives: the real tools have rows of identical patches on one surface.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import ConvexHull, QhullError
+
+from app.geometry.cleaning import areas, face_pairs
+from app.geometry.tool import Array
+
+Integers = NDArray[np.int64]
+ON_PLANE = 1e-5  # share of the diagonal within which a vertex lies on the cutting plane
+LARGE = 0.2  # regions with a larger share of the working surface are cut
+SCRAP = 0.35  # pieces below this share of an equal part go to the piece they share most border with
+UNEVEN, EXTRA = 0.3, 0.3  # what rows of different length and one part too many cost, against the log aspect of a part
+ROUNDS = 4  # scraps leave fewer parts than planned; so often we cut again
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A triangle mesh with what each triangle belongs to."""
+
+    vertices: Array  # (V, 3) metres
+    faces: Integers  # (F, 3)
+    cad_face: NDArray[np.int32]  # (F,) -1 without
+    labels: Integers  # (F,) region, -1 outside the working surface
+
+    def shares(self) -> Array:
+        """Area of each region over that of all (N,)."""
+        inside = self.labels >= 0
+        area = np.bincount(self.labels[inside], weights=areas(self.vertices, self.faces)[inside])
+        return area / area.sum()
+
+
+def split_large(surface: Surface, least: int, most: int) -> Surface:
+    """Cut the largest regions until there are `least` and none is large, but never more than `most`."""
+    for _ in range(ROUNDS):
+        shares = surface.shares()
+        parts = _parts(shares, least, most)
+        if (parts == 1).all():
+            break
+        room = most - int(parts.sum())
+        for region in np.flatnonzero(parts > 1):
+            surface, extra = _split(surface, int(region), int(parts[region]), room > 0)
+            room -= extra
+    return surface
+
+
+def connected(group: NDArray[np.integer], pairs: Integers) -> Integers:
+    """Number of the connected piece of equal `group` that each face lies in."""
+    same = pairs[group[pairs[:, 0]] == group[pairs[:, 1]]]
+    n = len(group)
+    graph = coo_matrix((np.ones(len(same)), (same[:, 0], same[:, 1])), shape=(n, n))
+    return connected_components(graph, directed=False)[1].astype(np.int64)
+
+
+def cut_by_plane(surface: Surface, region: int, normal: Array, offset: float) -> Surface:
+    """Split the triangles of `region` along the plane normal . x = offset, and their neighbours at the new vertices."""
+    height = surface.vertices @ normal - offset
+    height[np.abs(height) < ON_PLANE * np.linalg.norm(np.ptp(surface.vertices, axis=0))] = 0
+    total = len(surface.vertices)
+    edges = np.sort(np.stack([surface.faces, np.roll(surface.faces, -1, axis=1)], axis=-1), axis=-1)  # (F, 3, 2)
+    keys = edges[..., 0] * total + edges[..., 1]
+    inside = surface.labels == region
+    crossed = np.unique(keys[inside][height[edges[inside]].prod(axis=-1) < 0])
+    if len(crossed) == 0:
+        return surface
+    low, high = crossed // total, crossed % total
+    along = height[low] / (height[low] - height[high])
+    points = surface.vertices[low] + along[:, None] * (surface.vertices[high] - surface.vertices[low])
+    at = np.minimum(np.searchsorted(crossed, keys), len(crossed) - 1)
+    middle = np.where(crossed[at] == keys, total + at, -1)
+    faces, source = _subdivide(surface.faces, middle, np.concatenate([surface.vertices, points]))
+    return Surface(np.concatenate([surface.vertices, points]), faces, surface.cad_face[source], surface.labels[source])
+
+
+def _subdivide(faces: Integers, middle: Integers, vertices: Array) -> tuple[Integers, Integers]:
+    """Triangles (F', 3) after new vertices `middle` (F, 3; -1 none) on their edges, and the old face of each (F',)."""
+    count = (middle >= 0).sum(axis=1)
+    whole, one, two = (np.flatnonzero(count == n) for n in range(3))
+    a, b, c, m, _ = _turned(faces, middle, one, np.argmax(middle[one] >= 0, axis=1))
+    pieces = [faces[whole], np.stack([a, m, c], axis=1), np.stack([m, b, c], axis=1)]
+    a, b, c, m, n = _turned(faces, middle, two, (np.argmin(middle[two] >= 0, axis=1) + 2) % 3)
+    across = np.linalg.norm(vertices[m] - vertices[c], axis=1) < np.linalg.norm(vertices[b] - vertices[n], axis=1)
+    pieces += [np.stack([a, m, n], axis=1), np.stack([m, b, np.where(across, c, n)], axis=1)]
+    pieces.append(np.stack([np.where(across, m, b), c, n], axis=1))
+    return np.concatenate(pieces), np.concatenate([whole, one, one, two, two, two])
+
+
+def _turned(faces: Integers, middle: Integers, chosen: Integers, first: Integers) -> tuple[Integers, ...]:
+    """Corners a, b, c of the chosen faces from corner `first` on, and the new vertices on ab and ca."""
+    turn = (first[:, None] + np.arange(3)) % 3
+    corners = np.take_along_axis(faces[chosen], turn, axis=1)
+    new = np.take_along_axis(middle[chosen], turn, axis=1)
+    return corners[:, 0], corners[:, 1], corners[:, 2], new[:, 0], new[:, 2]
+
+
+def _parts(shares: Array, least: int, most: int) -> Integers:
+    """Into how many parts each region is cut (N,): always one more for the largest parts."""
+    parts = np.ones(len(shares), np.int64)
+    while parts.sum() < most and (parts.sum() < least or (shares / parts).max() > LARGE):
+        parts[np.argmax(shares / parts)] += 1
+    return parts
+
+
+def _split(surface: Surface, region: int, parts: int, spare: bool) -> tuple[Surface, int]:
+    """Cut one region into parts, one more when that is `spare` and fits better; also how many more."""
+    frame, size = _rectangle(surface, region)
+    planned, rows = _layout(parts, size[0] / max(size[1], 1e-9 * size[0]), spare)
+    per_row = [planned // rows + (r < planned % rows) for r in range(rows)]
+    surface, marked = _cut_along(surface, region, frame[0], np.cumsum(per_row)[:-1] / planned)
+    if planned % rows == 0:
+        surface, columns = _cut_along(surface, region, frame[1], np.arange(1, per_row[0]) / per_row[0])
+        inside = surface.labels == region
+        row = _cell(surface, inside, frame[0], marked)
+        cells = row * per_row[0] + _cell(surface, inside, frame[1], columns)
+    else:
+        surface, cells = _cut_rows(surface, region, frame, marked, per_row)
+    return _gather(surface, region, cells, planned), planned - parts
+
+
+def _cut_rows(surface: Surface, region: int, frame: Array, marked: Array, per_row: list[int]) -> tuple[Surface, Integers]:
+    """Cut rows of different length into columns each; the surface and the cell of each face of the region."""
+    aside = int(surface.labels.max()) + 1
+    inside = surface.labels == region
+    labels = surface.labels.copy()
+    labels[inside] = aside + _cell(surface, inside, frame[0], marked)
+    surface = replace(surface, labels=labels)
+    cell = np.full(len(labels), -1, np.int64)
+    for r, n in enumerate(per_row):
+        surface, columns = _cut_along(surface, aside + r, frame[1], np.arange(1, n) / n)
+        per_row_columns = _cell(surface, surface.labels == aside + r, frame[1], columns)
+        labels = surface.labels.copy()
+        labels[surface.labels == aside + r] = aside + len(per_row) + sum(per_row[:r]) + per_row_columns
+        surface = replace(surface, labels=labels)
+    inside = surface.labels >= aside
+    cell = surface.labels[inside] - aside
+    return replace(surface, labels=np.where(inside, region, surface.labels)), cell
+
+
+def _cut_along(surface: Surface, region: int, direction: Array, fractions: Array) -> tuple[Surface, Array]:
+    """Cut a region where the given fractions of its area lie before; also the offsets of the planes."""
+    inside = surface.labels == region
+    corners = surface.vertices[surface.faces[inside]] @ direction
+    offsets = _quantiles(corners, areas(surface.vertices, surface.faces[inside]), fractions)
+    for offset in offsets:
+        surface = cut_by_plane(surface, region, direction, float(offset))
+    return surface, offsets
+
+
+def _quantiles(corners: Array, area: Array, fractions: Array) -> Array:
+    """Positions with the given fractions of the area before, by a sweep that spreads each triangle from end to end."""
+    low, high = corners.min(), corners.max()
+    grid = np.linspace(low, high, 257)
+    first, middle, last = np.sort(corners, axis=1).T
+    before = np.zeros(len(grid))
+    for at, x in enumerate(grid):
+        rising = np.clip(x - first, 0, None) ** 2 / np.maximum((last - first) * (middle - first), 1e-300)
+        falling = 1 - np.clip(last - x, 0, None) ** 2 / np.maximum((last - first) * (last - middle), 1e-300)
+        share = np.where(x <= middle, rising, falling)
+        before[at] = (area * np.where(x >= last, 1.0, np.where(x <= first, 0.0, share))).sum()
+    return np.interp(fractions * area.sum(), before, grid)
+
+
+def _cell(surface: Surface, inside: NDArray[np.bool_], direction: Array, offsets: Array) -> Integers:
+    """Number of planes before the middle of each chosen face."""
+    middle = surface.vertices[surface.faces[inside]].mean(axis=1) @ direction
+    return np.searchsorted(offsets, middle).astype(np.int64)
+
+
+def _rectangle(surface: Surface, region: int) -> tuple[Array, Array]:
+    """The two sides of the tightest rectangle around a region, longer first, as unit vectors (2, 3), and their lengths."""
+    faces = surface.faces[surface.labels == region]
+    area = areas(surface.vertices, faces)
+    centres = surface.vertices[faces].mean(axis=1)
+    corners = surface.vertices[np.unique(faces)]
+    middle = np.average(centres, axis=0, weights=area)
+    offset = surface.vertices[faces] - middle
+    _, axes = np.linalg.eigh(np.einsum("f,fia,fib->ab", area, offset, offset))
+    plane = axes[:, :0:-1].T  # the two widest directions
+    flat = (corners - middle) @ plane.T
+    try:
+        hull = flat[ConvexHull(flat).vertices]
+    except QhullError:  # all in one line
+        return plane, np.ptp(flat, axis=0)
+    sides = np.roll(hull, -1, axis=0) - hull
+    sides /= np.linalg.norm(sides, axis=1)[:, None]
+    frames = np.stack([sides, np.stack([-sides[:, 1], sides[:, 0]], axis=1)], axis=1)  # (H, 2, 2)
+    sizes = np.ptp(np.einsum("hij,vj->hvi", frames, hull), axis=1)
+    best = int(np.argmin(sizes.prod(axis=1)))
+    order = np.argsort(-sizes[best])
+    return frames[best][order] @ plane, sizes[best][order]
+
+
+def _layout(parts: int, aspect: float, spare: bool) -> tuple[int, int]:
+    """Number of parts and of rows across the long side that make the parts squarest."""
+
+    def effort(planned: int, rows: int) -> float:
+        squareness = abs(np.log(aspect / rows * (planned / rows)))
+        return float(squareness + UNEVEN * (planned % rows > 0) + EXTRA * (planned - parts))
+
+    choices = [(planned, rows) for planned in range(parts, parts + 1 + spare) for rows in range(1, planned + 1)]
+    return min(choices, key=lambda c: effort(*c))
+
+
+def _gather(surface: Surface, region: int, cells: Integers, parts: int) -> Surface:
+    """Label the connected pieces of the cells; scraps go to the piece of this region they share most border with."""
+    inside = np.flatnonzero(surface.labels == region)
+    faces = surface.faces[inside]
+    pairs = face_pairs(faces)
+    piece = connected(cells, pairs)
+    area = areas(surface.vertices, faces)
+    length = _shared_length(surface.vertices, faces, pairs)
+    while True:
+        names, piece = np.unique(piece, return_inverse=True)
+        size = np.bincount(piece, weights=area)
+        least = int(np.argmin(size))
+        if len(names) == 1 or (len(names) <= parts and size[least] >= SCRAP * area.sum() / parts):
+            break
+        both = piece[pairs]
+        touching = (both == least).sum(axis=1) == 1
+        border = np.bincount(both[touching].sum(axis=1) - least, weights=length[touching], minlength=len(names))
+        piece = np.where(piece == least, int(np.argmax(border)), piece)
+    labels = surface.labels.copy()
+    labels[inside] = np.where(piece == 0, region, labels.max() + piece)
+    return replace(surface, labels=labels)
+
+
+def _shared_length(vertices: Array, faces: Integers, pairs: Integers) -> Array:
+    """Length of the edge that each pair of faces shares (P,)."""
+    first, second = faces[pairs[:, 0]], faces[pairs[:, 1]]
+    common = (first[:, :, None] == second[:, None, :]).any(axis=2)
+    corner = np.argsort(~common, axis=1, kind="stable")[:, :2]
+    ends = vertices[np.take_along_axis(first, corner, axis=1)]
+    return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
