@@ -8,8 +8,11 @@ from numpy.typing import NDArray
 from app.geometry.fitting import CYLINDER, KINDS, NORMAL_WEIGHT, SIZE, SPHERE, face_sums, fit
 from app.geometry.tool import Array, Mesh
 
-PRIMITIVE_ERROR = 0.02  # RMS cost of a primitive / size of the region above which it is called free-form
+# RMS cost of a primitive / size of the region above which it is called free-form: facets of true primitives stay under
+# 2e-4, a doubly curved patch (Hood's crown, radii 0.20 m and 0.53 m) reaches 3.5e-3, a plane with its fillet 8e-3
+PRIMITIVE_ERROR = 0.002
 FLAT_TURN = np.radians(3)  # a region whose primitive bends less than this over its size counts as a plane
+NO_TURN = 1e-6  # rad; a free-form region that turns less on average (both ways alike) has no curvature, whatever the rounding
 
 
 @dataclass(frozen=True)
@@ -70,7 +73,8 @@ def region_shape(mesh: Mesh, faces: NDArray[np.int64]) -> tuple[float, str]:
         if kind in (SPHERE, CYLINDER) and abs(out[1]) < FLAT_TURN:
             return 0.0, "plane"
         return float(out[1]) / scale, KINDS[kind]
-    return turning_curvature(corners), "freeform"
+    bend = turning_curvature(corners)
+    return (bend if abs(bend) * scale > NO_TURN else 0.0), "freeform"
 
 
 def turning_curvature(corners: Array) -> float:

@@ -11,6 +11,18 @@ WALL, SLOPE = np.cos(np.radians(60)), np.cos(np.radians(18))  # normal's z below
 BENT = 0.12  # curvature x size of the tool from which a region is called bent
 NARROW = 0.35  # a bent region with a radius below this share of the tool's size is an edge or a fillet
 THIRD = 1 / 3
+MIDDLE = (0.4, 0.6)  # shares of the tool's size between which a slope stands neither left nor right
+LEVEL = 0.05  # share of the tool's size by which rows (columns) of like regions lie apart
+ALONG = (  # names from front to rear, the coarsest first; "" is the middle, named only when nothing else is said
+    ("front", "", "rear"),
+    ("front", "front middle", "rear middle", "rear"),
+    ("front", "front middle", "", "rear middle", "rear"),
+)
+ACROSS = (
+    ("left", "", "right"),
+    ("left", "left of centre", "right of centre", "right"),
+    ("left", "left of centre", "", "right of centre", "right"),
+)
 
 
 def describe(attributes: Attributes) -> tuple[str, ...]:
@@ -34,9 +46,9 @@ def _noun(attributes: Attributes, i: int, low: Array, high: Array) -> str:
     if normal[2] < WALL:
         return _wall(normal, relative)
     if abs(bend) > 1 / NARROW and normal[2] < SLOPE:
-        return f"{_toward(normal)} {'fillet' if bend < 0 else 'edge'}"
+        return _standing("fillet" if bend < 0 else "edge", normal, relative)
     if normal[2] < SLOPE:
-        return f"{_toward(normal)} slope"
+        return _standing("slope", normal, relative)
     if abs(bend) > BENT:
         return "Crown" if bend > 0 else "Hollow"
     if relative[2] < THIRD:
@@ -44,12 +56,13 @@ def _noun(attributes: Attributes, i: int, low: Array, high: Array) -> str:
     return "Top" if relative[2] > 2 * THIRD else "Step"
 
 
-def _toward(normal: Array) -> str:
-    """Side a slope looks to."""
-    x, y = normal[:2]
-    if abs(x) >= abs(y):
-        return "Left" if x < 0 else "Right"
-    return "Front" if y < 0 else "Rear"
+def _standing(noun: str, normal: Array, relative: Array) -> str:
+    """A slope is named by where it stands along the direction it leans; one in the middle only by what it is."""
+    axis = 0 if abs(normal[0]) >= abs(normal[1]) else 1
+    names = (("Left", "Right"), ("Front", "Rear"))[axis]
+    if MIDDLE[0] <= relative[axis] <= MIDDLE[1]:
+        return noun.capitalize()
+    return f"{names[int(relative[axis] > MIDDLE[1])]} {noun}"
 
 
 def _wall(normal: Array, relative: Array) -> str:
@@ -63,14 +76,26 @@ def _wall(normal: Array, relative: Array) -> str:
 
 
 def _place(centroid: Array, alike: Array, low: Array, high: Array) -> str:
-    """Where in plan view: front / middle / rear and left / right, only along directions in which like regions differ."""
-    relative = (centroid - low) / np.maximum(high - low, 1e-9)
-    spread = np.ptp((alike - low) / np.maximum(high - low, 1e-9), axis=0)
-    words = []
-    for axis, names in ((1, ("front", "", "rear")), (0, ("left", "", "right"))):
-        if len(alike) == 1 or spread[axis] > 0.1:
-            words.append(names[int(np.clip(relative[axis] / THIRD, 0, 2))])
+    """Where in plan view, only along directions in which like regions differ."""
+    size = np.maximum(high - low, 1e-9)
+    here, others = (centroid - low) / size, (alike - low) / size
+    words = [_word(here[axis], others[:, axis], names) for axis, names in ((1, ALONG), (0, ACROSS))]
     return " ".join(w for w in words if w) or "middle"
+
+
+def _word(here: float, others: Array, names: tuple[tuple[str, ...], ...]) -> str:
+    """Coarsest name of a position in [0, 1] that tells all levels of like regions apart; rows beyond five are counted."""
+    ordered = np.sort(others)
+    starts = np.flatnonzero(np.diff(ordered, prepend=-np.inf) > LEVEL)
+    levels = np.array([part.mean() for part in np.split(ordered, starts[1:])])
+    if len(levels) == 1 and len(others) > 1:
+        return ""
+    mine = int(np.argmin(np.abs(levels - here)))
+    for choice in names:
+        at = np.clip(levels * len(choice), 0, len(choice) - 1).astype(int)
+        if len(set(at.tolist())) == len(levels):
+            return choice[at[mine]]
+    return f"row {len(levels) - mine}" if names is ALONG else f"column {mine + 1}"
 
 
 def _numbered(texts: list[str], attributes: Attributes) -> tuple[str, ...]:
