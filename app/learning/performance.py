@@ -11,7 +11,12 @@ Paper:
     The rate falls as eta / (1 + 2 lambda eta t), the usual schedule for a loss with curvature 2 lambda.
     On the synthetic training tools two weights must be equal to the last bit. Subgradient steps come within 1e-3 of that and no closer,
         so after the stop test passes (or the rounds run out) the same loss, with gamma a hundred times larger, is minimised exactly
-        over the cheapest sequences met (`finish`).
+        over the cheapest sequences met (`finish`). Its weights are the last metric of the run.
+    Whether any weights explain all demonstrations depends on no answer, so it is found out by the same exact minimisation after the
+        first round; printed, the loop would ask on for ever. If none do, the compromise explains as many demonstrations as can be,
+        and one last round asks whether what it prefers to the odd one is just as good: if so the run stalls, else it is infeasible.
+    A round asks at most `most` questions, those of the largest gain first and the tools in turn, and none that reads like an earlier
+        one of its tool (`appearance`); printed, it is K for each violated tool.
 """
 
 from collections.abc import Mapping
@@ -22,6 +27,7 @@ from numpy.typing import NDArray
 
 from app.errors import EmptySample, InvalidInput
 from app.learning.loss import minimise_loss, performance_gradient, performance_loss
+from app.learning.performance_conflict import Contradiction, Members, contradiction_words, find_contradiction
 from app.learning.performance_state import (
     PARAMETER_WORDS,
     LearningDemonstration,
@@ -31,7 +37,7 @@ from app.learning.performance_state import (
     StepResult,
 )
 from app.learning.qp import Array
-from app.learning.questions import SimilarityQuestion, differing_regions, fingerprint
+from app.learning.questions import SimilarityQuestion, appearance, differing_regions, fingerprint
 from app.learning.sampling import POOL, diverse_sample, feature_scale, feature_sums, random_pool
 from app.sequencing.classes import best_classes
 from app.sequencing.problem import check_sequence
@@ -124,7 +130,10 @@ def performance_step(
         return _result(state, (), state.phase, "This run is finished.")
     if state.phase == "questions":
         recent = state.asked[len(state.asked) - state.latest :]
-        if recent and all(answers[q.fingerprint] == "similar" for q in recent):
+        similar = bool(recent) and all(answers[q.fingerprint] == "similar" for q in recent)
+        if state.contradiction and not similar:
+            return _infeasible(state, state.contradiction, ())
+        if similar:
             return _stalled(_Work.of(demonstrations, parameters, state, answers), state)
         state = replace(state, phase="training", step=0, round=state.round + 1, latest=0)
     work = _Work.of(demonstrations, parameters, state, answers)
@@ -144,28 +153,60 @@ def _close_round(work: "_Work", state: PerformanceState, metrics: tuple[Metric, 
     """The stop test of Algorithm 1 and, if it fails, the questions of the next round."""
     parameters = work.parameters
     if work.violated(state.w):
+        found = work.contradiction(state.w) if state.round == 1 else None
+        if found:
+            return _contradicted(work, state, found, metrics)
         questions = work.questions(state) if state.round < parameters.rounds else ()
         if questions:
-            state = replace(state, phase="questions", asked=state.asked + questions, latest=len(questions))
-            return _result(state, metrics, "questions", f"{_count(len(questions), 'question')} after round {state.round}.", questions)
+            return _ask(state, questions, metrics, f"{_count(len(questions), 'question')} after round {state.round}.")
         if state.round < parameters.rounds:
             state = replace(state, step=0, round=state.round + 1)
             return _result(state, metrics, "training", f"Round {state.round} begins; no new order to ask about.")
-    state = state.with_weights(work.finish(state.w))
-    left = work.violated(state.w)
-    if not left:
-        return _converged(work, state, metrics)
-    state = replace(state, phase="infeasible")
-    worst = "; ".join(f"demonstration {i + 1} costs {gap:.1%} more than the best order" for i, gap in left)
-    return _result(state, metrics, "infeasible", f"No weights were found that explain all demonstrations: {worst}.")
+    state, last = _finished(work, state, work.finish(state.w))
+    if not work.violated(state.w):
+        return _converged(work, state, (*metrics, last))
+    found = work.contradiction(state.w) or Contradiction(tuple(i for i, _ in work.violated(state.w)), clear=False, alone=False, rest=True)
+    return _infeasible(state, found, (*metrics, last))
+
+
+def _contradicted(work: "_Work", state: PerformanceState, found: Contradiction, metrics: tuple[Metric, ...]) -> StepResult:
+    """Settle on the compromise, and ask once whether the orders it prefers are just as good."""
+    everyone = range(len(work.demonstrations))
+    followed = tuple(i for i in everyone if i not in found.odd) if found.clear and found.rest else tuple(everyone)
+    state, last = _finished(work, state, work.only(followed).finish(state.w))
+    state = replace(state, contradiction=found)
+    metrics = (*metrics, last)
+    questions = work.questions(state)
+    if not questions:
+        return _infeasible(state, found, metrics)
+    return _ask(state, questions, metrics, contradiction_words(found, _names(state)))
+
+
+def _ask(state: PerformanceState, questions: tuple[SimilarityQuestion, ...], metrics: tuple[Metric, ...], message: str) -> StepResult:
+    state = replace(state, phase="questions", asked=state.asked + questions, latest=len(questions))
+    return _result(state, metrics, "questions", message, questions)
+
+
+def _finished(work: "_Work", state: PerformanceState, w: Array) -> tuple[PerformanceState, Metric]:
+    """The state with its last weights, and the metric that describes them."""
+    state = replace(state.with_weights(w), iteration=state.iteration + 1)
+    return state, work.metric(w, work.cheapest(w), state.iteration)
+
+
+def _infeasible(state: PerformanceState, found: Contradiction, metrics: tuple[Metric, ...]) -> StepResult:
+    state = replace(state, phase="infeasible", contradiction=found)
+    return _result(state, metrics, "infeasible", contradiction_words(found, _names(state)))
 
 
 def _stalled(work: "_Work", state: PerformanceState) -> StepResult:
     """Every order shown was called similar, so no sample grows; the exact minimiser may still explain all demonstrations."""
-    finished = state.with_weights(work.finish(state.w))
+    text = "Every order shown was just as good as the recorded one: nothing is left to learn from."
+    if state.contradiction:
+        return _result(state, (), "stalled", text)
+    finished, last = _finished(work, state, work.finish(state.w))
     if not work.violated(finished.w):
-        return _converged(work, finished, ())
-    return _result(finished, (), "stalled", "Every order shown was just as good as the recorded one: nothing is left to learn from.")
+        return _converged(work, finished, (last,))
+    return _result(finished, (last,), "stalled", text)
 
 
 def _converged(work: "_Work", state: PerformanceState, metrics: tuple[Metric, ...]) -> StepResult:
@@ -228,11 +269,33 @@ class _Work:
         """One projected subgradient step; the metric describes w before it."""
         p = self.parameters
         best = self.cheapest(w)
-        value = performance_loss(w, self.demo, self.samples, best, p.terms)
-        violations = int((self.gaps(w, best) > p.tolerance).sum())
         gradient = performance_gradient(w, self.demo, self.samples, best, p.terms)
         rate = p.learning_rate / (1 + 2 * p.regularisation * p.learning_rate * iteration)
-        return np.maximum(w - rate * gradient, self.floor), Metric.of(iteration + 1, value, violations)
+        return np.maximum(w - rate * gradient, self.floor), self.metric(w, best, iteration + 1)
+
+    def metric(self, w: Array, best: Array, iteration: int) -> Metric:
+        """Loss and violations of w, as they are plotted."""
+        value = performance_loss(w, self.demo, self.samples, best, self.parameters.terms)
+        return Metric.of(iteration, value, int((self.gaps(w, best) > self.parameters.tolerance).sum()))
+
+    def only(self, members: Members) -> "_Work":
+        """The same with some of the demonstrations."""
+        return replace(
+            self,
+            demonstrations=[self.demonstrations[i] for i in members],
+            demo=self.demo[list(members)],
+            samples=[self.samples[i] for i in members],
+            taken=[self.taken[i] for i in members],
+        )
+
+    def contradiction(self, w: Array) -> Contradiction | None:
+        """Whether no weights explain all demonstrations, by exact minimisation from w; and which stand against each other."""
+
+        def fits(members: Members) -> float:
+            part = self.only(members)
+            return sum(gap for _, gap in part.violated(part.finish(w)))
+
+        return find_contradiction(len(self.demonstrations), fits)
 
     def finish(self, w: Array) -> Array:
         """Minimise Eq. 7 exactly: solve over the rows met so far, add each tool's new cheapest sequence, repeat."""
@@ -251,19 +314,30 @@ class _Work:
         return w
 
     def questions(self, state: PerformanceState) -> tuple[SimilarityQuestion, ...]:
-        """One candidate per cost class below the demonstration, at most K per violated tool, never the same feature sum twice."""
-        w, found = state.w, []
-        for i, _ in self.violated(w):
-            d = self.demonstrations[i]
-            known = [self.demo[i], *self.taken[i]]
-            for candidate in best_classes(d.problem, w / self.scale, self.parameters.classes):
-                phi = d.problem.feature_sum(candidate.sequence) / self.scale
-                better = (self.demo[i] - phi) @ w / self.size(w, i)
-                if better < -self.parameters.tolerance or any(np.abs(phi - k).max() < SAME for k in known):
-                    continue
-                known.append(phi)
-                found.append(_question(i, d, candidate.sequence, float(better)))
-        return tuple(found)
+        """The candidates of largest gain, the violated tools in turn; never the same feature sum or the same look twice."""
+        offers: list[tuple[int, float, SimilarityQuestion]] = []
+        for i, _ in self.violated(state.w):
+            own = sorted(self.offers(state, i), key=lambda offer: -offer[0])
+            offers += [(turn, -better, question) for turn, (better, question) in enumerate(own)]
+        offers.sort(key=lambda offer: (offer[0], offer[1], offer[2].fingerprint))
+        return tuple(question for _, _, question in offers[: self.parameters.most])
+
+    def offers(self, state: PerformanceState, i: int) -> list[tuple[float, SimilarityQuestion]]:
+        """One candidate per cost class below demonstration i, at most K, with the relative gain."""
+        d, w = self.demonstrations[i], state.w
+        known = [self.demo[i], *self.taken[i]]
+        looks = {appearance(d.sequence, q.candidate) for q in state.asked if q.demonstration == i}
+        found: list[tuple[float, SimilarityQuestion]] = []
+        for candidate in best_classes(d.problem, w / self.scale, self.parameters.classes):
+            phi = d.problem.feature_sum(candidate.sequence) / self.scale
+            better = float((self.demo[i] - phi) @ w / self.size(w, i))
+            look = appearance(d.sequence, candidate.sequence)
+            if better < -self.parameters.tolerance or look in looks or any(np.abs(phi - k).max() < SAME for k in known):
+                continue
+            known.append(phi)
+            looks.add(look)
+            found.append((better, _question(i, d, candidate.sequence, better)))
+        return found
 
 
 def _question(i: int, demonstration: LearningDemonstration, candidate: tuple[int, ...], better: float) -> SimilarityQuestion:
@@ -283,6 +357,10 @@ def _result(
     state: PerformanceState, metrics: tuple[Metric, ...], outcome: str, message: str, questions: tuple[SimilarityQuestion, ...] = ()
 ) -> StepResult:
     return StepResult(state, metrics, outcome, questions, state.policy_weights, message)
+
+
+def _names(state: PerformanceState) -> list[str]:
+    return [f"demonstration {i + 1}" for i in range(len(state.samples))]
 
 
 def _identity(demonstrations: Demonstrations) -> str:

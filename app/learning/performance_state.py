@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from app.learning.loss import LossTerms, LossValue
+from app.learning.performance_conflict import Contradiction
 from app.learning.qp import Array
 from app.learning.questions import Sequence, SimilarityQuestion
 from app.sequencing.problem import SequencingProblem
@@ -13,7 +14,7 @@ from app.sequencing.problem import SequencingProblem
 
 @dataclass(frozen=True)
 class PerformanceParameters:
-    """Hyperparameters of Algorithm 1 and Eq. 7, with two of our own (`floor`, `rounds`).
+    """Hyperparameters of Algorithm 1 and Eq. 7, with three of our own (`floor`, `rounds`, `most`).
 
     Paper: alpha, beta, gamma, lambda, zeta, T, p, K are named there, their values are not. Ours were chosen by leaving out one of the
         six synthetic training tools at a time. They state a prior: with lambda and the floor this strong against alpha and beta, a weight
@@ -33,6 +34,7 @@ class PerformanceParameters:
     tolerance: float = 1e-3
     floor: float = 0.1
     rounds: int = 20
+    most: int = 4
 
     @property
     def terms(self) -> LossTerms:
@@ -52,6 +54,7 @@ PARAMETER_WORDS: dict[str, tuple[str, str]] = {
     "tolerance": ("ε", "Costs this close count as equal"),
     "floor": ("w_min", "Smallest weight of a feature"),
     "rounds": ("R", "Rounds before giving up"),
+    "most": ("q", "Questions per round"),
 }
 
 
@@ -65,9 +68,9 @@ class LearningDemonstration:
 
 @dataclass(frozen=True)
 class Metric:
-    """One gradient step as it is plotted."""
+    """One gradient step, or the exact finish, as it is plotted."""
 
-    iteration: int  # counts from 1 over all rounds
+    iteration: int  # counts from 1 over all rounds; the exact finish counts as one
     loss: float
     terms: dict[str, float]  # alpha, beta, gamma, regularisation
     violations: int  # demonstrations that are not the cheapest on their tool
@@ -89,24 +92,29 @@ class PerformanceState:
     weights: tuple[float, ...]  # (n + m,) on scaled features
     samples: tuple[tuple[Sequence, ...], ...]  # X at the start, per demonstration
     generator: dict[str, Any]  # state of the run's random generator
-    iteration: int = 0  # gradient steps so far
+    iteration: int = 0  # gradient steps so far, and one for the exact finish
     step: int = 0  # of the current round
     round: int = 1
     asked: tuple[SimilarityQuestion, ...] = ()  # all questions so far, oldest first
     latest: int = 0  # how many of them belong to the last round
     phase: str = "training"  # "training" | "questions" | "converged" | "infeasible"
+    contradiction: Contradiction | None = None  # found after the first round
 
     def to_json(self) -> dict[str, Any]:
         """Plain JSON values; floats survive bit for bit (shortest repr)."""
         fields = {name: getattr(self, name) for name in self.__dataclass_fields__}
         fields["asked"] = [{name: getattr(q, name) for name in q.__dataclass_fields__} for q in self.asked]
+        found = self.contradiction
+        fields["contradiction"] = None if found is None else {name: getattr(found, name) for name in found.__dataclass_fields__}
         return _plain(fields)
 
     @staticmethod
     def from_json(value: dict[str, Any]) -> "PerformanceState":
         asked = tuple(SimilarityQuestion(**{k: _tuples(v) for k, v in q.items()}) for q in value["asked"])
+        found = value.get("contradiction")
+        contradiction = None if found is None else Contradiction(**{k: _tuples(v) for k, v in found.items()})
         fields = {k: v if k == "generator" else _tuples(v) for k, v in value.items()}
-        return PerformanceState(**{**fields, "asked": asked})
+        return PerformanceState(**{**fields, "asked": asked, "contradiction": contradiction})
 
     def with_weights(self, w: Array) -> "PerformanceState":
         return replace(self, weights=tuple(float(x) for x in w))

@@ -34,6 +34,15 @@ def differing_regions(left: Sequence, right: Sequence) -> Sequence:
     return tuple(a for a, b in zip(left, right, strict=True) if a != b)
 
 
+def appearance(left: Sequence, right: Sequence) -> tuple[int, ...]:
+    """What a person sees of the difference: where `right` first departs and to what, where it ends, how much has moved.
+
+    Two questions about one demonstration with the same appearance read the same.
+    """
+    step = next((k for k, (a, b) in enumerate(zip(left, right, strict=True)) if a != b), len(left))
+    return (step, *right[step : step + 1], *right[-1:], len(differing_regions(left, right)))
+
+
 def fingerprint(kind: str, demonstration: int, left: Sequence, right: Sequence) -> str:
     """The same question has the same fingerprint in every process."""
     text = f"{kind}|{demonstration}|{','.join(map(str, left))}|{','.join(map(str, right))}"

@@ -16,6 +16,8 @@ from app.learning.performance import (
     performance_step,
     start_performance,
 )
+from app.learning.performance_conflict import Contradiction
+from app.learning.questions import appearance
 from app.sequencing.shortest import shortest_sequence
 from tests.learning.made_up import TRUE_WEIGHTS, demonstrations, learn, problems
 
@@ -153,11 +155,78 @@ def contradiction() -> list[LearningDemonstration]:
 
 
 def test_contradicting_demonstrations_end_as_infeasible():
+    """Of two nobody can say which one is wrong: both are named."""
     demos = contradiction()
     result, _ = learn(demos, ScriptedExpert(None, None), CONTRADICTION, start_performance(demos, CONTRADICTION, 0), 1000)
     assert result.outcome == "infeasible"
-    assert "demonstration" in result.message
+    assert result.message.startswith("Demonstration 1 and demonstration 2 contradict each other")
+    assert result.state.contradiction == Contradiction((0, 1), clear=False, alone=False, rest=False)
     assert np.isfinite(result.weights).all()
+
+
+@pytest.mark.parametrize("odd", [0, 3, 5])
+def test_one_reversed_among_five_is_named_after_few_questions(odd: int):
+    """At most 2 rounds and 6 questions, whatever is answered "No"; the compromise explains the other five exactly."""
+    six = demonstrations(EXPERT, problems(6))
+    six[odd] = replace(six[odd], sequence=six[odd].sequence[::-1])
+    parameters = PerformanceParameters()
+    result, answers = learn(six, ScriptedExpert(None, None), parameters, start_performance(six, parameters, 1), 7)
+    assert result.outcome == "infeasible"
+    assert len(answers) <= 6
+    assert result.state.round <= 2
+    assert result.state.contradiction is not None
+    assert result.state.contradiction.odd == (odd,)
+    assert result.message.startswith(f"Demonstration {odd + 1} c")
+    assert f"Record demonstration {odd + 1} again" in result.message
+    assert PerformanceState.from_json(json.loads(json.dumps(result.state.to_json()))) == result.state
+    for i, d in enumerate(six):
+        excess = d.problem.cost(result.weights, d.sequence) / shortest_sequence(d.problem, result.weights).cost - 1
+        assert (excess > 1e-3) == (i == odd)
+
+
+def test_six_consistent_ones_converge_with_few_questions_a_round():
+    six = demonstrations(EXPERT, problems(6))
+    parameters = replace(ASKING, most=2, classes=5)
+    state, answers, rounds = start_performance(six, parameters, asking_seed(six)), {}, []
+    while (step := performance_step(six, parameters, state, answers, 1000)).outcome in ("training", "questions"):
+        state = step.state
+        for q in step.questions:
+            d = six[q.demonstration]
+            answers[q.fingerprint] = EXPERT.similar(d.problem, d.sequence, q.candidate)
+        rounds += [len(step.questions)] if step.questions else []
+    assert step.outcome == "converged"
+    assert step.metrics[-1].violations == 0
+    assert step.metrics[-1].iteration == step.state.iteration
+    assert rounds
+    assert max(rounds) <= 2
+    looks = [(q.demonstration, appearance(six[q.demonstration].sequence, q.candidate)) for q in step.state.asked]
+    assert len(set(looks)) == len(looks)
+
+
+def test_the_last_metric_describes_the_last_weights(demos):
+    """Of a converged run: no violation, and the loss of the weights it ends with, not of those a step before."""
+    for seed in range(4):
+        state, answers, metrics = start_performance(demos, ASKING, seed), {}, []
+        while True:
+            step = performance_step(demos, ASKING, state, answers, 1000)
+            state = step.state
+            metrics += step.metrics
+            for q in step.questions:
+                d = demos[q.demonstration]
+                answers[q.fingerprint] = EXPERT.similar(d.problem, d.sequence, q.candidate)
+            if step.outcome not in ("training", "questions"):
+                break
+        assert step.outcome == "converged"
+        assert [m.iteration for m in metrics] == list(range(1, state.iteration + 1))
+        assert metrics[-1].violations == 0
+        assert metrics[-1].terms["regularisation"] == pytest.approx(ASKING.regularisation * float(state.w @ state.w), rel=1e-12)
+
+
+def test_orders_that_look_alike_have_one_appearance():
+    """The same step, the same other region, end and count; only the middle differs."""
+    mine = (0, 1, 2, 3, 4, 5)
+    assert appearance(mine, (1, 0, 3, 2, 4, 5)) == appearance(mine, (1, 0, 2, 4, 3, 5)) == (0, 1, 5, 4)
+    assert appearance(mine, (0, 2, 1, 3, 4, 5)) != appearance(mine, (1, 0, 2, 3, 4, 5))
 
 
 def test_all_similar_stalls():
