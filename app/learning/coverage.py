@@ -223,12 +223,12 @@ class _Study:
                 gains.append(now / of - (captured / possible if possible else 0.0))
             weak = [(c, dict(c.tools)[i]) for t in tables for row in t.cells for c in row if c.request and i in dict(c.tools)]
             gain = max(0.0, *gains)
-            if gain > 0 or any(c.state == "missing" for c, _ in weak):
+            if weak and (gain > 0 or any(c.state == "missing" for c, _ in weak)):
                 weak.sort(key=lambda pair: pair[0].state != "missing")
-                regions = tuple(dict.fromkeys(a for _, own in weak[:2] for a in own))[:SHOWN]
+                regions = weak[0][1]
                 letters = region_letters(self.regions[i])
                 places = _listed([letters[a] for a in sorted(regions)])
-                text = f"{_listed([c.text for c, _ in weak[:2]])}, most of all at {places}"
+                text = f"{weak[0][0].text}, most of all at {places}"
                 found.append(Request(text[0].upper() + text[1:], i, tuple(sorted(regions)), float(gain)))
         return found
 

@@ -43,7 +43,7 @@ function paintHead() {
   fill(parts.head, h("div.title", {}, h("h1", {}, "What the demonstrations show so far"),
     h("p", {}, `${sentence(spoken(demonstrations, "demonstration"))}, ${plural(steps, "step")}. A policy can only be trusted where it has seen examples.`)),
   first
-    ? h("div.next", {}, h("p", {}, h("span.kicker", {}, `Next: record ${first.tool_name}`), first.text), h("a.btn.primary", { href: pageAddress(shell.projectId, "record", { tool: first.tool_id }) }, "Record it"))
+    ? h("div.next", {}, h("p", {}, h("span.kicker", {}, `Next: record ${first.tool_name}`), first.gain > 0 ? `can lift coverage by ${first.gain.toFixed(2)}` : "it shows a new situation"), h("a.btn.primary", { href: pageAddress(shell.projectId, "record", { tool: first.tool_id }) }, "Record it"))
     : h("div.next", {}, h("p", {}, h("span.kicker", {}, "Next: teach"), "no tool here would add a situation"), h("a.btn.primary", { href: pageAddress(shell.projectId, "teach") }, "Go on to teach")));
 }
 
@@ -73,7 +73,7 @@ function matrix(table, t) {
     h("div.card-body", {}, h("div.matrix", { role: "group", "aria-label": table.label },
       table.cells.map((_, k) => table.cells.length - 1 - k).map((i) => [h("span.rowname", {}, table.row_words[i]), table.cells[i].map((_, j) => cell(table, t, i, j))]),
       h("span"), table.column_words.map((word) => h("span.col", {}, word)))),
-    h("p.axes.small.muted", {}, `upwards: ${table.row_title}, to the right: ${table.column_title}`));
+    h("p.axes.small.muted", {}, `↑ ${table.row_title}   → ${table.column_title}`));
 }
 
 function paintRequests() {
@@ -86,7 +86,7 @@ function shown() {
   const { chosen, report } = state;
   if (chosen?.request !== undefined) {
     const request = report.requests[chosen.request];
-    return request && { title: request.tool_name, note: request.text, tool_id: request.tool_id, tool_name: request.tool_name, regions: request.regions };
+    return request && { title: request.tool_name, note: `${plural(request.regions.length, "region")} outlined`, tool_id: request.tool_id, tool_name: request.tool_name, regions: request.regions };
   }
   if (chosen) {
     const table = report.tables[chosen.t];
