@@ -1,7 +1,11 @@
 """The MuJoCo scene: arm, spring-mounted roller and the tool's working surface. The world frame is the tool frame."""
 
+# mujoco is a compiled module without type stubs: its names are unknown to the checker
+# pyright: reportAttributeAccessIssue=false
+
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import cast
 
 import mujoco
 import numpy as np
@@ -115,7 +119,7 @@ def body_meshes(radius: float) -> tuple[tuple[Floats, Faces], ...]:
     shapes["flange"].append(_column([0, 0, -0.02], [0, 0, 0.03], 0.032))
     shapes["carriage"].append(_column([0, 0, 0.03], [0, 0, STEM], 0.012))
     shapes["roller"].append(trimesh.creation.icosphere(subdivisions=2, radius=radius))
-    joined = [trimesh.util.concatenate(shapes[name]) for name in BODIES]
+    joined = [cast(trimesh.Trimesh, trimesh.util.concatenate(shapes[name])) for name in BODIES]
     return tuple((np.asarray(m.vertices, np.float32), np.asarray(m.faces, np.int32)) for m in joined)
 
 

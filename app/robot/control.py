@@ -1,5 +1,8 @@
 """Position servos with admittance along the normal: the commanded offset integrates the force error at 500 Hz."""
 
+# mujoco is a compiled module without type stubs: its names are unknown to the checker
+# pyright: reportAttributeAccessIssue=false
+
 from dataclasses import dataclass
 
 import mujoco

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from app.geometry.tool import Array, Mesh
 
@@ -185,6 +185,6 @@ def coverage(samples: Samples, points: Array, normals: Array, width: float) -> f
     """Share of the samples that a roller at `points`, facing against `normals`, passes over."""
     if not len(points):
         return 0.0
-    distance, nearest = cKDTree(points).query(samples.points)
+    distance, nearest = KDTree(points).query(samples.points)
     faced = np.einsum("ij,ij->i", samples.normals, normals[nearest]) > FOLD
     return float(((distance <= width / 2) & faced).mean())

@@ -2,7 +2,7 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from app.geometry.tool import Array
 from app.robot.parameters import RollerSize
@@ -15,7 +15,7 @@ def runs_over(patch: Patch, roller: RollerSize) -> list[Stroke]:
     """Runs of waypoints in contact, in order; between two runs the roller lifts."""
     strokes = strokes_over(patch, roller.spacing, roller.step, margin=0.35 * roller.width)
     surface = draw_samples(patch, roller.width / 2)
-    tree = cKDTree(surface.points)
+    tree = KDTree(surface.points)
     runs: list[Stroke] = []
     for stroke in _ordered(strokes):
         turn = _turn(runs[-1], stroke, surface, tree, roller) if runs else None
@@ -47,7 +47,7 @@ def _ordered(strokes: list[Stroke]) -> list[Stroke]:
     return order
 
 
-def _turn(run: Stroke, stroke: Stroke, surface: Samples, tree: cKDTree, roller: RollerSize) -> Stroke | None:
+def _turn(run: Stroke, stroke: Stroke, surface: Samples, tree: KDTree, roller: RollerSize) -> Stroke | None:
     """Waypoints on the surface from the end of `run` to the start of `stroke`, without either; None where there is a gap."""
     a, b = run.points[-1], stroke.points[0]
     gap = float(np.linalg.norm(b - a))
@@ -61,7 +61,7 @@ def _turn(run: Stroke, stroke: Stroke, surface: Samples, tree: cKDTree, roller: 
     distance, nearest = tree.query(straight)
     if (distance > max(roller.width, 0.5 * roller.spacing)).any():
         return None
-    return Stroke(*_settle(straight, normals, surface, nearest))
+    return Stroke(*_settle(straight, normals, surface, np.asarray(nearest, np.int64)))
 
 
 def _settle(points: Array, normals: Array, surface: Samples, nearest: NDArray[np.int64]) -> tuple[Array, Array]:
