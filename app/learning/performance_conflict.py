@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 Members = tuple[int, ...]
 
+LISTED = 5  # more names than this are counted instead
+
 
 @dataclass(frozen=True)
 class Contradiction:
@@ -62,7 +64,8 @@ def contradiction_words(found: Contradiction, names: Sequence[str]) -> str:
         whose = "the order recorded for it" if not many else "the orders recorded for them"
         why = f"{odd} can't be explained: no weights make {whose} the best one, not even alone"
     else:
-        why = f"{odd} {'contradict' if many else 'contradicts'} {_list(others, 'and')}: no weights explain all of them together"
+        all_others = _list(others, "and") if len(others) <= LISTED else f"the other {len(others)}"
+        why = f"{odd} {'contradict' if many else 'contradicts'} {all_others}: no weights explain all of them together"
     if not found.rest:
         return _sentence(f"{why}. Record {odd} again, or use the best compromise.")
     agree = "The others agree with each other. " if len(others) > 1 else ""

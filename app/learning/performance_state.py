@@ -141,6 +141,10 @@ class StepResult:
     weights: Array  # (n + m,) on unscaled features
     message: str
 
+    @property
+    def contradiction(self) -> Contradiction | None:
+        return self.state.contradiction
+
 
 def _plain(value: Any) -> Any:
     if isinstance(value, dict):

@@ -15,6 +15,7 @@ from app.storage.tables import (
     Run,
     RunDemonstration,
     Segmentation,
+    ToolRow,
 )
 from app.workflow.context import Context
 from app.workflow.lookup import check_tools, found, present, refuse_while_training, standing
@@ -164,11 +165,18 @@ def finish_run(ctx: Context, run_id: str) -> Json:
         if row.state not in ("stalled", "infeasible") or checkpoint is None:
             raise Conflict(f"Only a run that found nothing left to learn can be finished; this one is {row.state.replace('_', ' ')}.")
         write_policy(session, row, checkpoint.weights, checkpoint.identifiable, converged=False)
+        words = "Finished with what was learned so far." if row.state == "stalled" else _compromise_words(session, row)
         row.error = None
-        go(session, row, "converged", "Finished with what was learned so far.")
+        go(session, row, "converged", words)
         return run_json(session, row)
 
     return ctx.store.write(change)
+
+
+def _compromise_words(session: Session, row: Run) -> str:
+    names = [found(session, ToolRow, key, "tool").name for key in (row.error or {}).get("tools", [])]
+    between = f" ({', '.join(names)})" if names else ""
+    return f"Finished with the best compromise between orders that contradict each other{between}."
 
 
 def _check_kind(kind: str) -> None:

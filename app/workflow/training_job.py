@@ -23,10 +23,11 @@ from app.learning.performance import (
     performance_step,
     start_performance,
 )
+from app.learning.performance_conflict import Contradiction, contradiction_words
 from app.learning.qp import Array
 from app.sequencing.problem import SequencingProblem
 from app.storage import emit
-from app.storage.tables import Demonstration, JobRow, Metric, PolicyRow, Query, Run, RunCheckpoint, RunDemonstration, Segmentation
+from app.storage.tables import Demonstration, JobRow, Metric, PolicyRow, Query, Run, RunCheckpoint, RunDemonstration, Segmentation, ToolRow
 from app.workflow.lookup import found
 from app.workflow.run_rows import TRAINING_JOB, checkpoint_of, current_answer, go, parameters_for, write_policy
 from app.workflow.values import Kept, Values, interactions_from
@@ -76,6 +77,7 @@ class Outcome:
     weights: tuple[float, ...]
     identifiable: tuple[bool, ...]
     message: str
+    contradiction: Contradiction | None = None
 
 
 def handler(values: Values) -> Handler:
@@ -138,7 +140,7 @@ def finish(values: Values, session: Session, job: JobRow, out: Outcome) -> None:
         go(session, row, "training", out.message)
         add_job(session, KIND, row.project_id, row.id, job.title)
     elif out.outcome == "questions":
-        go(session, row, "waiting_for_expert", out.message)
+        go(session, row, "waiting_for_expert", _words(session, row, out))
     else:
         _close(session, row, out)
 
@@ -177,6 +179,7 @@ def _performance(step: Step, demonstrations: list[LearningDemonstration]) -> Out
         weights=_floats(result.weights),
         identifiable=tuple(bool(x) for x in result.state.identifiable),
         message=result.message,
+        contradiction=result.contradiction,
     )
 
 
@@ -256,5 +259,19 @@ def _close(session: Session, row: Run, out: Outcome) -> None:
     if out.outcome == "converged":
         write_policy(session, row, list(out.weights), list(out.identifiable), converged=True)
     elif out.outcome == "infeasible":
-        row.error = {"error": "ContradictoryAnswers", "detail": out.message}
-    go(session, row, out.outcome, out.message)
+        shown, found_odd = demonstrations_of(session, row.id), out.contradiction.odd if out.contradiction else ()
+        row.error = {
+            "error": "ContradictoryAnswers",
+            "detail": _words(session, row, out),
+            "tools": [shown[i].tool_id for i in found_odd],
+        }
+    go(session, row, out.outcome, _words(session, row, out))
+
+
+def _words(session: Session, row: Run, out: Outcome) -> str:
+    """What a step says, with the names of the tools where it says which demonstrations contradict each other."""
+    if out.contradiction is None or out.outcome not in ("questions", "infeasible"):
+        return out.message
+    names = [found(session, ToolRow, shown.tool_id, "tool").name for shown in demonstrations_of(session, row.id)]
+    words = contradiction_words(out.contradiction, names)
+    return words if out.outcome == "infeasible" else f"Is the other order just as good? {words}"

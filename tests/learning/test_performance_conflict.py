@@ -53,3 +53,9 @@ def test_words_name_who_and_what_to_do():
     alone = contradiction_words(Contradiction((0,), clear=True, alone=True, rest=False), ["demonstration 1"])
     assert alone.startswith("Demonstration 1 can't be explained")
     assert alone.endswith("Record demonstration 1 again, or use the best compromise.")
+
+
+def test_many_names_are_counted():
+    names = [f"Trough {k:02d}" for k in range(1, 9)]
+    words = contradiction_words(Contradiction((7,), clear=True, alone=False, rest=True), names)
+    assert words.startswith("Trough 08 contradicts the other 7: no weights")

@@ -10,7 +10,7 @@ from sqlmodel import col, select
 from app.errors import AlreadyAnswered, Conflict, InvalidInput, RunActive
 from app.settings import Settings
 from app.storage.tables import Answer, JobRow, Query, RunCheckpoint
-from app.workflow import policies, projects, runs, tools
+from app.workflow import demonstrations, policies, projects, runs, tools
 from app.workflow.context import Context, open_context
 from tests.workflow.conftest import project_of
 
@@ -129,6 +129,40 @@ def test_a_finished_run_leaves_a_policy_and_its_history(sample: Context) -> None
     assert [m["iteration"] for m in items] == list(range(1, run["iteration"] + 1))
     assert all(sum(m["terms"].values()) == pytest.approx(m["loss"]) for m in items)
     assert runs.metrics(sample, run["id"], after=3) == items[3:]
+
+
+def test_a_converged_run_reports_no_violation(sample: Context) -> None:
+    run = finish(sample, waiting(sample))
+    assert run["message"].startswith("Every recorded order is")
+    assert run["violations"] == 0
+    assert runs.metrics(sample, run["id"])[-1]["violations"] == 0
+
+
+def test_an_arbitrary_sixth_order_is_named_soon_and_can_be_left_out(sample: Context) -> None:
+    """No to everything ends after few questions, with the tool's name; the compromise is a policy that explains the others."""
+    project = project_of(sample)["id"]
+    tool = next(t for t in tools.list_tools(sample, project) if t["split"] == "train" and not t["demonstrated"])
+    demonstrations.create_demonstration(sample, tool["id"], list(range(12)))
+    run = waiting(sample)
+    assert tool["name"] in run["message"]
+    while run["state"] == "waiting_for_expert":
+        for query in open_questions(sample, run):
+            assert query["tool_id"] == tool["id"]
+            runs.answer(sample, query["id"], "not_similar")
+        run = settle(sample, run)
+    assert run["state"] == "infeasible"
+    assert run["round"] <= 2
+    assert 1 <= run["asked"] <= 6
+    assert run["message"].startswith(f"{tool['name']} contradicts {tools.get_tool(sample, run['tools'][0])['name']}, ")
+    assert f"Record {tool['name']} again" in run["message"]
+    assert run["error"] == {"error": "ContradictoryAnswers", "detail": run["message"], "tools": [tool["id"]]}
+
+    done = runs.finish_run(sample, run["id"])
+    assert (done["state"], done["error"], done["violations"]) == ("converged", None, 1)
+    assert tool["name"] in done["message"]
+    assert policies.get_policy(sample, done["policy_id"])["converged"] is False
+    with pytest.raises(Conflict, match="can be finished"):
+        runs.finish_run(sample, run["id"])
 
 
 def test_two_answers_at_once_exactly_one_counts(sample: Context) -> None:

@@ -67,27 +67,39 @@ export async function startCards({ project, runs, onStarted }) {
       startButton(project.id, "effort", effort, learned, "Start asking", empty ?? before, onStarted), learned ? effort.node : null));
 }
 
+function learnedWords(run) {
+  if (run.kind !== "performance") return "Learned: which order is less effort";
+  return run.violations ? "Learned, but not every recorded order is the best one" : "Learned: every demonstration is explained";
+}
+
 const OUTCOMES = {
-  converged: (run) => ({ tone: "ok", mark: "shield", title: run.kind === "performance" ? "Learned: every demonstration is explained" : "Learned: which order is less effort", text: `${plural(run.asked, "question")} asked, ${run.answered} answered.` }),
+  converged: (run) => ({ tone: "ok", mark: "shield", title: learnedWords(run), text: `${plural(run.asked, "question")} asked, ${run.answered} answered.` }),
   stalled: () => ({ tone: "warn", mark: "warn", title: "Nothing is left to ask", text: "Every order that was shown is as good as yours by your own answers. You can take what was learned, or record one more demonstration." }),
-  infeasible: () => ({ tone: "bad", mark: "warn", title: "Some answers or demonstrations contradict each other", text: "No weights can satisfy all of them." }),
+  infeasible: () => ({ tone: "bad", mark: "warn", title: "Some demonstrations contradict each other", text: "No weights explain all of them. Nothing is lost: record one again, or go on with the weights that explain the most." }),
   failed: () => ({ tone: "bad", mark: "warn", title: "The run stopped with an error", text: "It can go on from where it was saved last." }),
   cancelled: () => ({ tone: "", mark: "stop", title: "The run was stopped", text: "Answers that were given stay in the history." }),
 };
 
-function outcomeActions(run, project, act) {
+// Links to the tools whose orders contradict the others; to all demonstrations where it isn't known which they are.
+function recordAgain(run, project, tools) {
+  const odd = (run.error?.tools ?? []).map((id) => tools.find((tool) => tool.id === id)).filter(Boolean);
+  if (!odd.length) return [h("a.btn", { href: pageAddress(project.id, "record") }, "Look at the demonstrations")];
+  return odd.map((tool, i) => h(`a.btn${i === 0 && odd.length === 1 ? ".primary" : ""}`, { href: pageAddress(project.id, "record", { tool: tool.id }) }, `Record ${tool.name} again`));
+}
+
+function outcomeActions(run, project, act, tools) {
   const button = (words, action, primary = false) => h(`button.btn${primary ? ".primary" : ""}`, { type: "button", onclick: () => act(action).catch(complain) }, words);
   if (run.state === "converged") return [h("a.btn.primary", { href: pageAddress(project.id, "policy") }, "See the policy")];
   if (run.state === "stalled") return [button("Take what was learned", "finish", true), h("a.btn", { href: pageAddress(project.id, "coverage") }, "What to record next")];
   if (run.state === "failed") return [button("Go on", "resume", true)];
-  if (run.state === "infeasible") return [h("a.btn", { href: pageAddress(project.id, "record") }, "Look at the demonstrations")];
+  if (run.state === "infeasible") return [...recordAgain(run, project, tools), button("Use the best compromise", "finish")];
   return [];
 }
 
-export function outcomeCard({ run, project, act }) {
+export function outcomeCard({ run, project, act, tools = [] }) {
   const outcome = OUTCOMES[run.state]?.(run);
   if (!outcome) return null;
   const details = [run.message, typeof run.error === "string" ? run.error : run.error?.detail].filter(Boolean);
   return h("section.card.outcome", { "aria-label": "How it ended" }, h(`span.chip${outcome.tone ? `.${outcome.tone}` : ""}`, {}, icon(outcome.mark), `${run.kind === "performance" ? "Learning" : "Preferences"}, ${ago(run.updated_at)}`),
-    h("h2", {}, outcome.title), h("p", {}, outcome.text), [...new Set(details)].map((text) => h("p", {}, text)), h("div.actions", {}, outcomeActions(run, project, act)));
+    h("h2", {}, outcome.title), h("p", {}, outcome.text), [...new Set(details)].map((text) => h("p", {}, text)), h("div.actions", {}, outcomeActions(run, project, act, tools)));
 }

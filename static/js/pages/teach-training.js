@@ -41,7 +41,7 @@ export class Training {
     if (run.id !== this.runId) this.items = [];
     this.runId = run.id;
     this.run = run;
-    const facts = run.kind === "performance" ? [run.iteration ? `step ${run.iteration}` : null, run.loss === null ? null : `loss ${number(run.loss)}`, run.violations === null || run.state === "converged" ? null : explained(run.violations)] : [`round ${run.round}`, plural(run.answered, "answer")];
+    const facts = run.kind === "performance" ? [run.iteration ? `step ${run.iteration}` : null, run.loss === null ? null : `loss ${number(run.loss)}`, run.violations === null ? null : explained(run.violations)] : [`round ${run.round}`, plural(run.answered, "answer")];
     fill(this.facts, facts.filter(Boolean).map((text) => h("span", {}, text)));
     const words = { queued: "about to start", training: "learning", waiting_for_expert: "paused until you answer", cancelling: "stopping" };
     this.state.textContent = words[run.state] ?? "";
