@@ -116,7 +116,8 @@ def test_a_region_with_a_step_in_it_is_told():
     """A wall of 12 mm across the middle of the only region: the ball of about 17 mm can't go down to its foot."""
     tool = block(lambda x, y: np.where(x > 0.001, 0.012, 0.0) + 0 * y, size=(0.16, 0.1), columns=1, cell=0.005)
     (report,) = simulate(tool, (0,), RobotParameters()).region_reports
-    worst = (report.force_max_n > 27, report.force_rms_n > 2, report.off_path_max_mm > 2, report.covered < 0.9)
-    assert any(worst)
-    assert len(report.problems) >= sum(worst)
-    assert all("egion A" in text for _, text in report.problems)
+    assert report.force_max_n > 50  # otherwise the tool is no misfit and the test says nothing
+    texts = [text for _, text in report.problems]
+    assert f"Region A: the roller pressed with {report.force_max_n:.0f} N where 20 N were wanted." in texts
+    assert any(f"{report.force_rms_n:.1f} N (root mean square)" in text for text in texts)
+    assert any(f"pushed {report.off_path_max_mm:.1f} mm off" in text for text in texts)
