@@ -42,7 +42,11 @@ def find_contradiction(count: int, fits: Callable[[Members], float]) -> Contradi
         odd, kept = (*odd, worst), tuple(k for k in kept if k != worst)
         if left[worst] == 0:
             break
-    return Contradiction(tuple(sorted(odd)), clear=True, alone=False, rest=True)
+    for i in odd[:-1]:  # taken out on the way, though it may fit to those that were left in the end
+        together = tuple(sorted((*kept, i)))
+        if fits(together) == 0:
+            kept = together
+    return Contradiction(tuple(i for i in everyone if i not in kept), clear=True, alone=False, rest=True)
 
 
 def contradiction_words(found: Contradiction, names: Sequence[str]) -> str:

@@ -59,3 +59,12 @@ def test_many_names_are_counted():
     names = [f"Trough {k:02d}" for k in range(1, 9)]
     words = contradiction_words(Contradiction((7,), clear=True, alone=False, rest=True), names)
     assert words.startswith("Trough 08 contradicts the other 7: no weights")
+
+
+def test_one_that_was_suspected_first_is_cleared_again():
+    """0 is in the most conflicts and goes first, then 1 and 2; but without 1, 2 and 3 it fits, so it is not named."""
+    table = fits({0, 1}, {0, 2}, {0, 3}, {1, 4}, {2, 5}, {3, 6}, {1}, {2}, {3})
+    found = find_contradiction(7, table)
+    assert found is not None
+    assert table(tuple(i for i in range(7) if i not in found.odd)) == 0
+    assert found.odd == (1, 2, 3)
