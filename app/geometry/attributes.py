@@ -38,7 +38,7 @@ def find_attributes(mesh: Mesh, labels: NDArray[np.int32]) -> Attributes:
     inside = labels >= 0
 
     def total(values: Array) -> Array:
-        return np.bincount(labels[inside], weights=values[inside], minlength=n)
+        return np.bincount(labels[inside], weights=values[inside], minlength=n).astype(float, copy=False)
 
     area = total(face_area)
     centres = corners.mean(axis=1)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from app.errors import TooLarge, UnreadableMesh
 from app.geometry.tool import Array
@@ -88,7 +88,7 @@ def weld(vertices: Array, faces: Integers) -> tuple[Array, Integers]:
     used = np.unique(faces)
     diagonal = float(np.linalg.norm(np.ptp(vertices[used], axis=0)))
     exact, first, inverse = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
-    pairs = cKDTree(exact).query_pairs(WELD * diagonal, output_type="ndarray") if np.isfinite(exact).all() else np.empty((0, 2), int)
+    pairs = KDTree(exact).query_pairs(WELD * diagonal, output_type="ndarray") if np.isfinite(exact).all() else np.empty((0, 2), int)
     graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(exact), len(exact)))
     _, group = connected_components(graph, directed=False)
     _, representative = np.unique(group, return_index=True)
@@ -115,7 +115,7 @@ def _drop_useless(vertices: Array, faces: Integers, cad_face: Integers, lines: l
     return faces, cad_face
 
 
-def edge_table(faces: Integers) -> tuple[Integers, Integers, Integers]:
+def edge_table(faces: NDArray[np.integer]) -> tuple[Integers, Integers, Integers]:
     """Edges (E, 2) sorted, the edge of each face side (F, 3), and the number of faces at each edge (E,)."""
     sides = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2).astype(np.int64), axis=1)
     n = int(faces.max()) + 1
@@ -123,7 +123,7 @@ def edge_table(faces: Integers) -> tuple[Integers, Integers, Integers]:
     return np.stack([key // n, key % n], axis=1), inverse.reshape(-1, 3), count
 
 
-def face_pairs(faces: Integers) -> Integers:
+def face_pairs(faces: NDArray[np.integer]) -> Integers:
     """Pairs of faces (P, 2) that share an edge with exactly two faces."""
     _, side_edge, count = edge_table(faces)
     flat = side_edge.ravel()
@@ -137,8 +137,8 @@ def _refuse_soup(faces: Integers) -> None:
     connected = (count[side_edge] >= 2).any(axis=1).mean()
     if len(faces) > 1 and connected < LEAST_CONNECTED:
         raise UnreadableMesh(
-            f"The {len(faces):,} triangles don't form a surface: only {100 * connected:.0f} % of them touch another triangle along an edge. "
-            "Export the part as one connected solid or surface."
+            f"The {len(faces):,} triangles don't form a surface: only {100 * connected:.0f} % of them touch another triangle "
+            "along an edge. Export the part as one connected solid or surface."
         )
 
 
@@ -152,7 +152,7 @@ def components(faces: Integers) -> Integers:
     return np.unique(group[: len(faces)], return_inverse=True)[1].ravel()
 
 
-def areas(vertices: Array, faces: Integers) -> Array:
+def areas(vertices: Array, faces: NDArray[np.integer]) -> Array:
     """Area of each face (F,)."""
     corners = vertices[faces]
     return np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2

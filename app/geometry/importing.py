@@ -170,7 +170,9 @@ def _run_child(folder: Path, file_name: str, kind: str) -> None:
             command, cwd=folder, env=environment, stdin=subprocess.DEVNULL, capture_output=True, timeout=WALL_SECONDS, check=False
         )
     except subprocess.TimeoutExpired as error:
-        raise UnreadableMesh(f"{file_name}: reading took longer than {WALL_SECONDS:.0f} s and was stopped. Export it more coarsely.") from error
+        raise UnreadableMesh(
+            f"{file_name}: reading took longer than {WALL_SECONDS:.0f} s and was stopped. Export it more coarsely."
+        ) from error
     if (folder / "result.json").exists():
         return
     if b"MemoryError" in done.stderr or b"Unable to allocate" in done.stderr:

@@ -19,7 +19,7 @@ from app.geometry.cleaning import RawSurface, clean
 
 MEMORY_BYTES = 6 * 2**30
 CPU_SECONDS = 120
-COARSE_SAG, FINE_SAG = 200, 2000  # STEP: the diagonal divided by this is the allowed distance to the true surface
+COARSE_SAG, FINE_SAG = 200, 2000  # STEP: an edge (probe) or the diagonal (load) over this is the allowed distance to the true surface
 ANGLE = 0.2  # rad between neighbouring facets of a STEP surface
 UNIT_NAMES = {"meters": "m", "meter": "m", "millimeters": "mm", "millimeter": "mm", "centimeters": "cm", "inches": "in", "inch": "in"}
 
@@ -54,17 +54,16 @@ def parse(data: bytes, kind: str, fine: bool) -> tuple[RawSurface, dict[str, obj
 
 def _brep_scene(data: bytes, kind: str, fine: bool) -> trimesh.Scene:
     """Triangulate a STEP or IGES file; the tolerance is absolute, so the size has to be known first."""
-    scene = _triangulate(data, kind, 0.0)
+    scene = _triangulate(data, kind, 1 / COARSE_SAG, relative=True)
     diagonal = float(np.linalg.norm(scene.extents)) if scene.extents is not None else 0.0
     if not fine or not diagonal > 0:
         return scene
     per_metre = 1000.0  # cascadio writes metres, but takes its tolerance in the file's unit, nearly always mm
-    return _triangulate(data, kind, diagonal * per_metre / FINE_SAG)
+    return _triangulate(data, kind, diagonal * per_metre / FINE_SAG, relative=False)
 
 
-def _triangulate(data: bytes, kind: str, sag: float) -> trimesh.Scene:
-    options = {"tol_linear": sag, "tol_angular": ANGLE} if sag else {}
-    glb = cascadio.load(data, file_type=kind, include_brep=True, **options)
+def _triangulate(data: bytes, kind: str, sag: float, relative: bool) -> trimesh.Scene:
+    glb = cascadio.load(data, file_type=kind, tol_linear=sag, tol_angular=ANGLE, tol_relative=relative, include_brep=True)  # pyright: ignore[reportArgumentType]
     if not glb:
         raise UnreadableMesh("The CAD kernel can't read this file: it is damaged or holds no shape. Export it again.")
     return trimesh.load(io.BytesIO(glb), file_type="glb", process=False)  # pyright: ignore[reportReturnType]

@@ -65,7 +65,12 @@ def _kind_of_content(data: bytes) -> str | None:
         return "stl"
     if start[:5].lower() == b"solid" and b"facet" in data[:65536]:
         return "stl"
-    for magic, name in ((b"%PDF", "a PDF document"), (b"\x89PNG", "a PNG picture"), (b"\xff\xd8\xff", "a JPEG picture"), (b"\x7fELF", "a program")):
+    for magic, name in (
+        (b"%PDF", "a PDF document"),
+        (b"\x89PNG", "a PNG picture"),
+        (b"\xff\xd8\xff", "a JPEG picture"),
+        (b"\x7fELF", "a program"),
+    ):
         if start.startswith(magic):
             return name
     if b"\0" not in data[:65536] and re.search(rb"(?m)^v\s+[-+.\d]", data[:65536]):
@@ -123,7 +128,7 @@ def _check_obj(file_name: str, data: bytes) -> None:
 
 
 def _check_ply(file_name: str, data: bytes) -> None:
-    header, end, body = data[:65536].partition(b"end_header")
+    header, end, _body = data[:65536].partition(b"end_header")
     if not end:
         raise UnreadableMesh(f"{file_name} is truncated: its PLY header has no end.")
     faces = re.search(rb"element\s+face\s+(\d+)", header)
@@ -132,7 +137,9 @@ def _check_ply(file_name: str, data: bytes) -> None:
         raise UnreadableMesh(f"{file_name} holds points but no faces. Export a surface, not a point cloud.")
     stated = int(faces.group(1)) + (int(vertices.group(1)) if vertices else 0)
     if stated > len(data):  # every vertex and face takes more than a byte
-        raise UnreadableMesh(f"{file_name} says it holds {stated:,} vertices and faces, more than its {len(data):,} bytes can. It is damaged.")
+        raise UnreadableMesh(
+            f"{file_name} says it holds {stated:,} vertices and faces, more than its {len(data):,} bytes can. It is damaged."
+        )
 
 
 def _check_off(file_name: str, data: bytes) -> None:

@@ -54,15 +54,17 @@ def test_units_scale_to_metres(units: str, metres: float, tmp_path: Path) -> Non
     part = load_part(saved(tmp_path, stl(CORNERS, TRIANGLES)), "box.stl", units, "+z")
     assert np.ptp(part.mesh.vertices, axis=0) == pytest.approx(np.array([6, 4, 2]) * metres)
     assert volume(part) == pytest.approx(BOX_VOLUME * metres**3)
-    assert part.mesh.vertices.dtype == np.float64 and part.mesh.faces.dtype == np.int32
+    assert part.mesh.vertices.dtype == np.float64
+    assert part.mesh.faces.dtype == np.int32
     assert part.report.lines[0] == ("info", f"16 triangles, {6000 * metres:.4g} × {4000 * metres:.4g} × {2000 * metres:.4g} mm.")
     assert set(METRES) == {"mm", "cm", "m", "in"}
 
 
 def test_the_part_stands_in_the_middle_on_the_ground(tmp_path: Path) -> None:
-    part = load_part(saved(tmp_path, obj(CORNERS + [100, -50, 7], TRIANGLES)), "box.obj", "m", "+z")
+    part = load_part(saved(tmp_path, obj(CORNERS + np.array([100, -50, 7]), TRIANGLES)), "box.obj", "m", "+z")
     low, high = part.mesh.vertices.min(axis=0), part.mesh.vertices.max(axis=0)
-    assert low == pytest.approx([-3, -2, 0]) and high == pytest.approx([3, 2, 2])
+    assert low == pytest.approx([-3, -2, 0])
+    assert high == pytest.approx([3, 2, 2])
 
 
 @pytest.mark.parametrize("up", UP)
@@ -118,14 +120,17 @@ class TestCleaning:
         corners = np.array([[0, 0, 0], [3, 0, 0], [0, 4, 0], [3, 0, 4e-6], [3, 4, 0], [0, 4, 1e-4]], float)
         vertices, faces = weld(corners, np.array([[0, 1, 2], [3, 4, 5]]))
         assert len(vertices) == 5
-        assert faces[0, 1] == faces[1, 0] and faces[0, 2] != faces[1, 2]
+        assert faces[0, 1] == faces[1, 0]
+        assert faces[0, 2] != faces[1, 2]
 
     def test_stl_is_welded_and_says_so(self, tmp_path: Path) -> None:
         part = load_part(saved(tmp_path, stl(CORNERS, TRIANGLES)), "box.stl", "m", "+z")
         assert len(part.mesh.vertices) == 10
         assert sentences(part, "info")[1:] == ["Joined 38 doubled corner points.", "The surface is closed."]
-        assert sentences(part, "warning") == [] and sentences(part, "repaired") == []
-        assert (part.cad_face == -1).all() and len(part.cad_face) == 16
+        assert sentences(part, "warning") == []
+        assert sentences(part, "repaired") == []
+        assert (part.cad_face == -1).all()
+        assert len(part.cad_face) == 16
 
     def test_repairs_are_listed_and_made(self, tmp_path: Path) -> None:
         """One triangle twice, one without area, one turned over."""
@@ -157,7 +162,8 @@ class TestCleaning:
         vertices = np.concatenate([CORNERS, CORNERS / 2 + [20, 0, 0]])
         part = load_part(saved(tmp_path, obj(vertices, np.concatenate([TRIANGLES, TRIANGLES + 10]))), "two.obj", "m", "+z")
         assert sentences(part, "warning") == ["Kept the largest of 2 separate bodies and left out the others (20.0 % of the area)."]
-        assert len(part.mesh.faces) == 16 and volume(part) == pytest.approx(BOX_VOLUME)
+        assert len(part.mesh.faces) == 16
+        assert volume(part) == pytest.approx(BOX_VOLUME)
 
     def test_cad_faces_follow_their_triangles(self) -> None:
         faces = np.concatenate([TRIANGLES[:3], TRIANGLES[:1], TRIANGLES[3:]])
@@ -177,12 +183,15 @@ class TestPublicFiles:
         """featuretype.STEP is 5 x 2.5 x 1.375 inches and has 96 CAD faces."""
         path = shared("cad", "featuretype.STEP")
         found = probe(path, "featuretype.STEP")
-        assert found.units == "m" and found.bodies == 1 and found.up_guess == "+z"
+        assert found.units == "m"
+        assert found.bodies == 1
+        assert found.up_guess == "+z"
         assert found.extents == pytest.approx(np.array([5, 2.5, 1.375]) * 0.0254, rel=1e-4)
         part = load_part(path, "featuretype.STEP", found.units, "+z")
         assert np.ptp(part.mesh.vertices, axis=0) == pytest.approx(np.array([5, 2.5, 1.375]) * 0.0254, rel=1e-4)
         assert np.unique(part.cad_face).tolist() == list(range(96))
-        assert "The surface is closed." in sentences(part, "info") and sentences(part, "warning") == []
+        assert "The surface is closed." in sentences(part, "info")
+        assert sentences(part, "warning") == []
         assert volume(part) > 0
 
     def test_airfoil_without_units(self) -> None:
@@ -191,7 +200,8 @@ class TestPublicFiles:
         assert probe(path, "naca0012.stl").units is None
         assert "Check the units (mm)" in sentences(load_part(path, "naca0012.stl", "mm", "+z"), "warning")[0]
         part = load_part(path, "naca0012.stl", "m", "+z")
-        assert sentences(part, "warning") == [] and len(part.mesh.faces) == 788
+        assert sentences(part, "warning") == []
+        assert len(part.mesh.faces) == 788
         assert np.ptp(part.mesh.vertices, axis=0) == pytest.approx([0.98894, 2, 0.18088], rel=1e-4)
 
     def test_text_stl_of_a_tray_lies_across_y(self) -> None:
@@ -199,4 +209,5 @@ class TestPublicFiles:
         assert probe(path, "tray.STL").up_guess == "+y"
         part = load_part(path, "tray.STL", "mm", "+y")
         assert np.ptp(part.mesh.vertices, axis=0) == pytest.approx([0.3556, 0.3556, 0.003175])
-        assert sentences(part, "warning") == [] and volume(part) > 0
+        assert sentences(part, "warning") == []
+        assert volume(part) > 0

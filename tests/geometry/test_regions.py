@@ -68,7 +68,9 @@ class TestUnitGrid:
     def test_areas_heights_angles_and_curvature(self) -> None:
         assert self.graph.area == pytest.approx(1 / 12)
         assert [r.area for r in self.tool.regions] == pytest.approx([1.0] * 12)
-        assert (self.graph.height == 1).all() and (self.graph.angle == 0).all() and (self.graph.curvature == 0).all()
+        assert (self.graph.height == 1).all()
+        assert (self.graph.angle == 0).all()
+        assert (self.graph.curvature == 0).all()
         assert {r.kind for r in self.tool.regions} == {"plane"}
 
     def test_letters_run_row_by_row_from_the_rear_left(self) -> None:
@@ -105,7 +107,8 @@ def test_tilt_angles_of_roof_and_valley_are_antisymmetric() -> None:
         z = sign * np.clip((x - 1) * 4 / 3, 0, 1)
         angle = np.degrees(measure(*surface(np.stack([x, y, z], -1), np.array([[0], [1], [2]]))).graph.angle)
         assert angle == pytest.approx(-angle.T)
-        assert angle[0, 1] == pytest.approx(53.1301, abs=1e-4) and angle[1, 2] == pytest.approx(-53.1301, abs=1e-4)
+        assert angle[0, 1] == pytest.approx(53.1301, abs=1e-4)
+        assert angle[1, 2] == pytest.approx(-53.1301, abs=1e-4)
         assert angle[0, 2] == 0
 
 
@@ -217,7 +220,8 @@ def test_ranges_and_descriptions(mould: Mould) -> None:
     assert len(set(descriptions)) == tool.n
     assert not any(character.isdigit() for text in descriptions for character in text)
     assert tool.graph.area.sum() == pytest.approx(1)
-    assert tool.graph.height.max() == 1 and tool.graph.height.min() >= 0
+    assert tool.graph.height.max() == 1
+    assert tool.graph.height.min() >= 0
     assert (tool.graph.shared.sum(axis=1) <= 1 + 1e-9).all()
     assert np.array_equal(tool.graph.neighbour, tool.graph.neighbour.T)
 
