@@ -33,7 +33,7 @@ class Borders:
 
     def perimeter(self, n: int) -> Array:
         """Whole border of each region, free parts included (n,), metres."""
-        return np.bincount(self.region, weights=self.length, minlength=n)
+        return np.bincount(self.region, weights=self.length, minlength=n).astype(float, copy=False)
 
 
 def find_borders(mesh: Mesh, labels: NDArray[np.int32]) -> Borders:
