@@ -27,7 +27,7 @@ const parts = {
   at: h("span.at.num"),
   speed: h("button.btn.quiet.small", { type: "button", dataset: { tip: "Playback speed (S)" }, onclick: () => nextSpeed() }),
   timeline: h("div.timeline"),
-  plots: h("div.plots"),
+  plots: h("div.robot-plots"),
   force: h("div.chart"),
   path: h("div.chart"),
   alert: h("div.alert"),
@@ -108,7 +108,7 @@ function paintTime() {
 
 function paintPlots() {
   const { series, regions, force_target_n: target } = state.playback;
-  const bands = regions.filter((entry) => entry.end_s > entry.start_s).map((entry) => ({ from: entry.start_s, to: entry.end_s, colour: rampColour(entry.step, regions.length) }));
+  const bands = regions.filter((entry) => entry.end_s > entry.start_s).map((entry) => ({ from: entry.start_s, to: entry.end_s, colour: rampColour(entry.step - 1, regions.length) }));
   const limit = { value: target * FORCE_SLACK, label: `limit ${number(target * FORCE_SLACK, 2)} N` };
   state.forceLine = line(parts.force, { title: "Force, N", x: series.t, y: series.force_n, limit, xTicks: false });
   state.pathLine = line(parts.path, { title: "Off path, mm", x: series.t, y: series.off_path_mm, bands, unit: "seconds" });
@@ -118,7 +118,7 @@ function row(entry) {
   const done = entry.end_s > entry.start_s;
   const bad = entry.problems.length > 0;
   return h("tr", { tabindex: "0", dataset: { region: entry.region, key: `row-${entry.region}`, ...(bad ? { tip: entry.problems.map((problem) => problem.text).join("\n") } : {}) }, onclick: () => done && seek(entry.start_s), onkeydown: (event) => event.key === "Enter" && done && seek(entry.start_s) },
-    h("td", {}, h("span.seq-no", { style: sequenceStyle(entry.step, state.playback.regions.length) }, entry.step + 1)), h("td.strong", {}, entry.name),
+    h("td", {}, h("span.seq-no", { style: sequenceStyle(entry.step - 1, state.playback.regions.length) }, entry.step)), h("td.strong", {}, entry.name),
     h("td.num", {}, done ? `${number(entry.force_rms_n, 2)} N` : "-"), h("td.num", {}, done ? `${number(entry.off_path_mm, 2)} mm` : "-"), h("td.num", {}, done ? `${(100 * entry.covered).toFixed(1)} %` : "-"), h("td.num", {}, done ? `${Math.round(entry.end_s - entry.start_s)} s` : "-"),
     h(`td.${bad ? "flag" : "good"}`, {}, icon(bad ? "warn" : "check"), h("span.visually-hidden", {}, bad ? "to look at" : "fine")));
 }
@@ -132,7 +132,7 @@ function paintReady() {
   const fact = (term, value, tip) => h("div.fact", { dataset: { tip } }, h("dt", {}, term), h("dd", {}, value));
   fill(parts.totals, fact("Cycle", clock(duration()), "Time from first to last movement"), fact("In contact", `${Math.round(100 * playback.in_contact_share)} %`, "Share of the time with the roller on the part"), fact("Force error", `${number(playback.force_error_n, 2)} N`, "Root mean square of measured minus commanded force while in contact"), fact("Covered", `${(100 * playback.covered).toFixed(1)} %`, "Share of the area under the roller's path"));
   parts.slider.max = String(duration());
-  fill(parts.bands, playback.regions.map((entry) => h("i", { style: { "--seq": rampColour(entry.step, playback.regions.length), flex: String(Math.max(0.01, entry.end_s - entry.start_s)) } })));
+  fill(parts.bands, playback.regions.map((entry) => h("i", { style: { "--seq": rampColour(entry.step - 1, playback.regions.length), flex: String(Math.max(0.01, entry.end_s - entry.start_s)) } })));
   paintPlots();
   paintTime();
 }
@@ -176,6 +176,7 @@ function paint() {
 // ---- reading ----------------------------------------------------------------------------------------------------------------------
 
 async function preview() {
+  document.activeElement?.blur(); // so that the space bar plays instead of computing again
   pause();
   state.time = 0;
   state.playback = await post(`/plans/${state.plan.id}/playbacks`);
