@@ -11,6 +11,7 @@ import tempfile
 import threading
 import time
 import webbrowser
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -97,6 +98,38 @@ def study(
 def plain(value: object) -> object:
     """JSON form of what a report holds beyond plain values (arrays, paths)."""
     return value.tolist() if hasattr(value, "tolist") else str(value)  # pyright: ignore[reportAttributeAccessIssue]
+
+
+@app.command()
+def bench(
+    name: Annotated[Literal["sequencing"], typer.Argument(help="What to measure.")],
+    data: Annotated[Path | None, typer.Option(exists=True, file_okay=False, help="Folder with the authors' tables.")] = None,
+    cad: Annotated[Path | None, typer.Option(exists=True, file_okay=False, help="Folder with CAD files.")] = None,
+    checkout: Annotated[Path | None, typer.Option(exists=True, file_okay=False, help="Checkout of the authors' code, for ratios.")] = None,
+    out: Annotated[Path | None, typer.Option(file_okay=False, help="Folder for pictures and tables.")] = None,
+    json_file: Annotated[Path | None, typer.Option("--json", help="Also write the figures to this file.")] = None,
+    quick: Annotated[bool, typer.Option(help="Smaller doses; bars may be missed.")] = False,
+) -> None:
+    """Measure and print each figure beside its bar; status 1 when a bar is missed."""
+    from importlib import import_module
+
+    from app.benches.figures import Figure, Options, as_json, grouped
+
+    seen: list[Figure] = []
+
+    def kept() -> Iterator[Figure]:
+        for figure in import_module(f"app.benches.{name}").measure(Options(data, cad, checkout, out, quick)):
+            seen.append(figure)
+            yield figure
+
+    for line in grouped(kept()):
+        typer.echo(line)
+    if json_file is not None:
+        json_file.write_text(json.dumps(as_json(seen), indent=2) + "\n", encoding="utf-8")
+    missed = sum(figure.met is False for figure in seen)
+    typer.echo(f"\n{sum(figure.met is True for figure in seen)} bars met, {missed} missed.")
+    if missed:
+        raise SystemExit(1)
 
 
 @app.command()

@@ -23,7 +23,8 @@ ALLOWED: dict[str, set[str]] = {
     "api": {"errors", "settings", "workflow", *CORE},
     "viewer": {"errors", "settings", "workflow", *CORE},
     "main": {"errors", "settings", "storage", "jobs", "workflow", "api", "viewer"},
-    "cli": {"errors", "settings", "storage", "workflow", "main", *CORE},
+    "benches": {"errors", *CORE},
+    "cli": {"errors", "settings", "storage", "workflow", "main", "benches", *CORE},
 }
 CORE_THIRD_PARTY = {"numpy", "scipy", "numba", "llvmlite", "trimesh", "mujoco", "clarabel", "cascadio", "networkx"}
 FORBIDDEN_IN_CORE = {

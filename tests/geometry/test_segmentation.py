@@ -83,4 +83,3 @@ def test_public_parts_become_tools_of_similar_regions(name: str, units: str, up:
         faces = np.flatnonzero(cut.labels == region)
         pairs = mesh.face_adjacency[np.isin(mesh.face_adjacency, faces).all(axis=1)]
         assert len(trimesh.graph.connected_components(pairs, nodes=faces)) == 1
-
