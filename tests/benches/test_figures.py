@@ -1,6 +1,7 @@
 """Bars of measured figures."""
 
 import json
+from pathlib import Path
 
 from typer.testing import CliRunner
 
@@ -33,6 +34,6 @@ def test_json_says_whether_the_bar_is_met() -> None:
 def test_the_command_prints_and_saves(tmp_path: object) -> None:
     target = f"{tmp_path}/figures.json"
     result = CliRunner().invoke(app, ["bench", "sequencing", "--quick", "--json", target])
-    saved = json.loads(open(target, encoding="utf-8").read())
+    saved = json.loads(Path(target).read_text(encoding="utf-8"))
     assert saved
     assert all(figure["name"] in result.output for figure in saved)
