@@ -30,6 +30,19 @@ class Shortest:
     ties: int  # sequences of this cost, this one included; 1 when not proved
     proved: bool
     method: str  # plain words
+    bound: float = -np.inf  # no sequence costs less; the cost itself when proved, -inf when not looked for
+
+    @property
+    def gap(self) -> float:
+        """How far the cost may lie above the optimum, as a share of |cost|: 0 when proved, infinite without a bound."""
+        return gap_between(self.cost, self.bound)
+
+
+def gap_between(cost: float, bound: float) -> float:
+    """(cost - bound) / |cost|; the optimum is at least cost - gap * |cost|, whatever the signs."""
+    if cost <= bound:
+        return 0.0
+    return float((cost - bound) / abs(cost)) if cost else np.inf
 
 
 @dataclass(frozen=True)
@@ -90,7 +103,8 @@ def shortest_sequence(problem: SequencingProblem, w: Array, tie_break: TieBreak 
         candidates += one_per_ends(solution)
         method += f" Ties settled among {len(set(candidates)):,} of {ties:,} equal sequences, every pair of first and last region included."
     sequence = min(candidates, key=lambda s: (tie_break(s), s)) if tie_break else candidates[0]
-    return Shortest(sequence, problem.cost(w, sequence), ties, proved=True, method=method)
+    cost = problem.cost(w, sequence)
+    return Shortest(sequence, cost, ties, proved=True, method=method, bound=cost)
 
 
 def tie_count(solution: Solution) -> int:
