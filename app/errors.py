@@ -1,7 +1,8 @@
 """Every error a person can cause or should read.
 
     AppError(message)            says what was wrong and what would be accepted
-      InvalidInput      422      UnreadableMesh, IncompleteSequence, UnknownFeature, MalformedTable, TooLarge (413)
+      InvalidInput      422      UnreadableMesh, IncompleteSequence, UnknownFeature, MalformedTable, TooLarge (413),
+                                 ContradictoryConstraints
       NotFound          404
       Conflict          409      AlreadyAnswered, RunActive, StalePolicy, StaleVersion (412)
       LearningFailed             NotConverged, ContradictoryAnswers, EmptySample
@@ -33,6 +34,10 @@ class IncompleteSequence(InvalidInput):
 
 class UnknownFeature(InvalidInput):
     """A feature or interaction that the feature set does not have."""
+
+
+class ContradictoryConstraints(InvalidInput):
+    """Wishes about an order that can't hold together; names the smallest set of them."""
 
 
 class TooLarge(InvalidInput):
