@@ -1,4 +1,4 @@
-"""Tools: uploads, the two import questions, segmentation, regions."""
+"""Tools: uploads, what their import asks, segmentation, regions."""
 
 import shutil
 import tempfile
@@ -20,15 +20,17 @@ router = APIRouter(tags=["tools"], route_class=ActionRoute)
 
 Units = Literal["mm", "cm", "m", "in"]
 Up = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+BodyId = Annotated[str, Field(pattern="^([1-9][0-9]?|all)$", description="Which body of the file: 1 is the largest; or all.")]
 MOST_TABLE_BYTES = 5_000_000
 
 
 class ToolChanges(Body):
-    """Fields left out stay as they are; units and up answer the import questions."""
+    """Fields left out stay as they are; units, up and body answer the import questions."""
 
     name: Name | None = None
     units: Units | None = None
     up: Up | None = None
+    body: BodyId | None = None
 
 
 class SegmentationOrder(Body):
@@ -55,7 +57,7 @@ class JobState(Row):
 class ReportLine(Row):
     """What the import saw or did."""
 
-    level: Literal["info", "repaired", "warning"]
+    level: Literal["info", "repaired", "refused", "warning"]
     text: str
 
 
@@ -64,6 +66,16 @@ class Failure(Row):
 
     error: str
     detail: str
+
+
+class FileBody(Row):
+    """One body of the file a tool was made from."""
+
+    id: str
+    name: str
+    extents: list[float]
+    faces: int
+    up_guess: str
 
 
 class Tool(Row):
@@ -77,6 +89,8 @@ class Tool(Row):
     questions: Json | None
     units: str | None
     up: str | None
+    body: str | None
+    bodies: list[FileBody]
     file_name: str | None
     split: Literal["train", "test"] | None
     region_count: int | None
@@ -149,11 +163,12 @@ def upload_tool(
     name: Annotated[Name | None, Form()] = None,
     units: Annotated[Units | None, Form()] = None,
     up: Annotated[Up | None, Form()] = None,
+    body: Annotated[BodyId | None, Form()] = None,
     _key: IdempotencyKey = None,
 ) -> Json:
-    """Upload CAD. Units and up-direction are asked for where the file doesn't say them."""
+    """Upload CAD. Units, up-direction and body are asked for where the file leaves them open."""
     with stored_upload(ctx, file) as (path, file_name):
-        tool = workflow.upload_tool(ctx, project_id, path, file_name, name=name, units=units, up=up)
+        tool = workflow.upload_tool(ctx, project_id, path, file_name, name=name, units=units, up=up, body=body)
     return located(response, "tools", tool)
 
 

@@ -1,4 +1,4 @@
-"""Turn parsed triangles into one welded, consistently wound surface, and say what was done to it."""
+"""Turn the triangles of one body into a welded, consistently wound surface, and count what was done to it."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -9,23 +9,21 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
-from app.errors import TooLarge, UnreadableMesh
+from app.errors import UnreadableMesh
 from app.geometry.tool import Array
 
-Level = Literal["info", "repaired", "warning"]
+Level = Literal["info", "repaired", "refused", "warning"]
 Integers = NDArray[np.int64]
 
 WELD = 1e-6  # share of the diagonal within which two vertices are one
 FLAT = 1e-12  # share of the squared diagonal below which a triangle has no area
-MOST_FACES = 2_000_000
-LEAST_CONNECTED = 0.5  # share of triangles that must touch another one along an edge
 
 
 @dataclass(frozen=True)
 class CleaningReport:
     """What was found and done, in plain sentences."""
 
-    lines: tuple[tuple[str, str], ...]  # (level "info" | "repaired" | "warning", sentence)
+    lines: tuple[tuple[str, str], ...]  # (level, sentence)
 
 
 @dataclass(frozen=True)
@@ -38,81 +36,82 @@ class RawSurface:
 
 
 @dataclass(frozen=True)
+class Findings:
+    """What was wrong with a body's triangles."""
+
+    joined: int  # corner points that were doubled and are now one
+    flat: int  # triangles without area, removed
+    doubled: int  # second copies of triangles, removed
+    turned: int  # triangles that faced the other way than their neighbours, turned
+    inside_out: bool  # all triangles of a closed body faced inward, turned
+    one_sided: bool  # like a Moebius strip
+    crowded: int  # edges shared by more than two triangles
+    borders: tuple[float, ...]  # length of each open border, file units
+
+    @property
+    def closed(self) -> bool:
+        """No triangle side is without a neighbour."""
+        return not self.borders
+
+
+@dataclass(frozen=True)
 class CleanSurface:
-    """One connected, welded surface."""
+    """A welded surface."""
 
     vertices: Array  # (V, 3) file units
     faces: Integers  # (F, 3)
     cad_face: Integers  # (F,)
-    closed: bool
-    lines: tuple[tuple[Level, str], ...]
+    findings: Findings
 
 
 def clean(raw: RawSurface) -> CleanSurface:
-    """Weld, drop useless triangles, keep the largest connected piece, and make all triangles face the same way.
+    """Weld, drop useless triangles, and make all triangles face the same way.
 
     Raises:
-        UnreadableMesh: No triangles, coordinates that are not numbers, or triangles that don't hang together.
-        TooLarge: More than MOST_FACES triangles.
+        UnreadableMesh: No triangle has an area.
     """
-    _refuse_hopeless(raw)
-    lines: list[tuple[Level, str]] = []
     vertices, faces = weld(raw.vertices, raw.faces)
-    if len(vertices) < len(raw.vertices):
-        lines.append(("info", f"Joined {len(raw.vertices) - len(vertices):,} doubled corner points."))
-    faces, cad_face = _drop_useless(vertices, faces, raw.cad_face, lines)
-    _refuse_soup(faces)
-    faces, cad_face = _keep_largest(vertices, faces, cad_face, lines)
-    vertices, faces = _compact(vertices, faces)
-    faces, closed = _orient(vertices, faces, lines)
-    return CleanSurface(vertices, faces, cad_face, closed, tuple(lines))
-
-
-def _refuse_hopeless(raw: RawSurface) -> None:
-    if len(raw.faces) == 0:
-        raise UnreadableMesh("The file holds no triangles. Export a solid or a surface, not only lines or points.")
-    if len(raw.faces) > MOST_FACES:
-        raise TooLarge(f"The file holds {len(raw.faces):,} triangles; at most {MOST_FACES:,} are accepted. Export it more coarsely.")
-    if raw.faces.min() < 0 or raw.faces.max() >= len(raw.vertices):
-        raise UnreadableMesh("A triangle refers to a corner point that is not in the file. The file is damaged; export it again.")
-    used = raw.vertices[np.unique(raw.faces)]
-    if not np.isfinite(used).all():
-        bad = int((~np.isfinite(used)).any(axis=1).sum())
-        raise UnreadableMesh(f"{bad:,} corner points have coordinates that are not numbers (NaN or infinite). Export the part again.")
-    if not np.ptp(used, axis=0).max() > 0:
-        raise UnreadableMesh("All corner points lie in one place: the part has no size.")
+    joined = len(np.unique(raw.faces)) - len(vertices)
+    faces, cad_face, flat, doubled = _drop_useless(vertices, faces, raw.cad_face)
+    used, inverse = np.unique(faces, return_inverse=True)
+    vertices, faces = vertices[used], inverse.reshape(-1, 3)
+    flip = _disagreeing(faces)
+    faces, turned = _turn(faces, flip)
+    edges, _, count = edge_table(faces)
+    borders = _border_lengths(vertices, edges[count == 1])
+    inside_out = not borders and flip is not None and _volume(vertices, faces) < 0
+    if inside_out:
+        faces = np.ascontiguousarray(faces[:, ::-1])
+    crowded = int((count > 2).sum())
+    return CleanSurface(vertices, faces, cad_face, Findings(joined, flat, doubled, turned, inside_out, flip is None, crowded, borders))
 
 
 def weld(vertices: Array, faces: Integers) -> tuple[Array, Integers]:
-    """Join vertices closer than WELD times the diagonal; the first of each group stays where it is."""
-    used = np.unique(faces)
-    diagonal = float(np.linalg.norm(np.ptp(vertices[used], axis=0)))
+    """Join vertices closer than WELD times the diagonal; the first of each group stays where it is, unused ones go."""
+    used, corner = np.unique(faces, return_inverse=True)
+    vertices = vertices[used]
+    diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     exact, first, inverse = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
-    pairs = KDTree(exact).query_pairs(WELD * diagonal, output_type="ndarray") if np.isfinite(exact).all() else np.empty((0, 2), int)
+    pairs = KDTree(exact).query_pairs(WELD * diagonal, output_type="ndarray")
     graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(exact), len(exact)))
     _, group = connected_components(graph, directed=False)
     _, representative = np.unique(group, return_index=True)
-    return vertices[first[representative]], group[inverse.ravel()][faces].astype(np.int64)
+    return vertices[first[representative]], group[inverse.ravel()][corner].reshape(-1, 3).astype(np.int64)
 
 
-def _drop_useless(vertices: Array, faces: Integers, cad_face: Integers, lines: list[tuple[Level, str]]) -> tuple[Integers, Integers]:
-    """Remove triangles without area and second copies."""
+def _drop_useless(vertices: Array, faces: Integers, cad_face: Integers) -> tuple[Integers, Integers, int, int]:
+    """Remove triangles without area and second copies; how many of each."""
     collapsed = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
     diagonal2 = float(np.sum(np.ptp(vertices, axis=0) ** 2))
-    corners = vertices[faces]
-    twice = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    keep = ~collapsed & (twice > FLAT * diagonal2)
-    if (~keep).any():
-        lines.append(("repaired", f"Removed {int((~keep).sum()):,} triangles without area."))
+    keep = ~collapsed & (2 * areas(vertices, faces) > FLAT * diagonal2)
+    flat = int((~keep).sum())
     faces, cad_face = faces[keep], cad_face[keep]
     if len(faces) == 0:
         raise UnreadableMesh("No triangle in the file has an area. Export a solid or a surface.")
     _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
-    if len(first) < len(faces):
-        lines.append(("repaired", f"Removed {len(faces) - len(first):,} doubled triangles."))
-        first.sort()
-        faces, cad_face = faces[first], cad_face[first]
-    return faces, cad_face
+    doubled = len(faces) - len(first)
+    first.sort()
+    return faces[first], cad_face[first], flat, doubled
 
 
 def edge_table(faces: NDArray[np.integer]) -> tuple[Integers, Integers, Integers]:
@@ -132,16 +131,6 @@ def face_pairs(faces: NDArray[np.integer]) -> Integers:
     return (order // 3).reshape(-1, 2)
 
 
-def _refuse_soup(faces: Integers) -> None:
-    _, side_edge, count = edge_table(faces)
-    connected = (count[side_edge] >= 2).any(axis=1).mean()
-    if len(faces) > 1 and connected < LEAST_CONNECTED:
-        raise UnreadableMesh(
-            f"The {len(faces):,} triangles don't form a surface: only {100 * connected:.0f} % of them touch another triangle "
-            "along an edge. Export the part as one connected solid or surface."
-        )
-
-
 def components(faces: Integers) -> Integers:
     """Connected piece of each face (any shared edge counts), numbered from 0."""
     _, side_edge, count = edge_table(faces)
@@ -158,46 +147,31 @@ def areas(vertices: Array, faces: NDArray[np.integer]) -> Array:
     return np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
 
 
-def _keep_largest(vertices: Array, faces: Integers, cad_face: Integers, lines: list[tuple[Level, str]]) -> tuple[Integers, Integers]:
-    """A tool is one connected surface: the piece with the largest area stays, the others are named in the report."""
-    piece = components(faces)
-    if piece.max() == 0:
-        return faces, cad_face
-    area = np.bincount(piece, weights=areas(vertices, faces))
-    largest = int(np.argmax(area))
-    share = 100 * (1 - area[largest] / area.sum())
-    lines.append(("warning", f"Kept the largest of {len(area):,} separate bodies and left out the others ({share:.1f} % of the area)."))
-    keep = piece == largest
-    return faces[keep], cad_face[keep]
+def _turn(faces: Integers, flip: NDArray[np.bool_] | None) -> tuple[Integers, int]:
+    """Turn the faces to flip, or all others if those are fewer."""
+    if flip is None or not flip.any():
+        return faces, 0
+    flip = flip if flip.mean() <= 0.5 else ~flip
+    return np.where(flip[:, None], faces[:, ::-1], faces), int(flip.sum())
 
 
-def _compact(vertices: Array, faces: Integers) -> tuple[Array, Integers]:
-    used, inverse = np.unique(faces, return_inverse=True)
-    return vertices[used], inverse.reshape(-1, 3)
+def _volume(vertices: Array, faces: Integers) -> float:
+    """Six times the enclosed volume; negative when the faces look inward."""
+    corners = (vertices - vertices.mean(axis=0))[faces]
+    return float(np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])))
 
 
-def _orient(vertices: Array, faces: Integers, lines: list[tuple[Level, str]]) -> tuple[Integers, bool]:
-    """Make neighbouring faces agree, closed surfaces face outward, and report the borders."""
-    flip = _disagreeing(faces)
-    if flip is None:
-        lines.append(("warning", "The surface has only one side (like a Moebius strip); inside and outside can't be told apart."))
-    elif flip.any():
-        flip = flip if flip.mean() <= 0.5 else ~flip
-        faces = np.where(flip[:, None], faces[:, ::-1], faces)
-        lines.append(("repaired", f"Turned {int(flip.sum()):,} triangles that faced the wrong way."))
-    _, _, count = edge_table(faces)
-    border, crowded = int((count == 1).sum()), int((count > 2).sum())
-    if crowded:
-        lines.append(("warning", f"{crowded:,} edges are shared by more than two triangles; regions end there."))
-    if border:
-        lines.append(("warning", f"The surface is open: {border:,} edges belong to one triangle only."))
-    else:
-        lines.append(("info", "The surface is closed."))
-        corners = vertices[faces] - vertices.mean(axis=0)
-        if np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) < 0:
-            faces = faces[:, ::-1]
-            lines.append(("repaired", "Turned the surface inside out: all triangles faced inward."))
-    return faces, border == 0
+def _border_lengths(vertices: Array, edges: Integers) -> tuple[float, ...]:
+    """Length of each connected open border, longest first."""
+    if len(edges) == 0:
+        return ()
+    n = len(vertices)
+    graph = coo_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(n, n))
+    group = connected_components(graph, directed=False)[1][edges[:, 0]]
+    length = np.bincount(
+        np.unique(group, return_inverse=True)[1], weights=np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
+    )
+    return tuple(float(x) for x in np.sort(length)[::-1])
 
 
 def _disagreeing(faces: Integers) -> NDArray[np.bool_] | None:

@@ -1,106 +1,71 @@
-"""Parse one CAD or mesh file with hard limits on memory and processor time: `python -m app.geometry.parser_child JOB`.
+"""The process that parses files: `python -m app.geometry.parser_child`, started once and kept ready.
 
-Native parsers may crash, hang or eat all memory on a hostile file, so they only ever run here. JOB is a folder with
-`request.json` and `input`; the answer is `result.json` and, for meshes, `result.npz`. Any other end is read as "damaged file".
+Native parsers may crash, hang or eat all memory on a hostile file, so they only ever run here. Importing them takes
+seconds; this process does it once and then forks a child with hard limits for every file. A request is one JSON line on
+stdin: {"folder", "input", "kind", "seconds"}. The child leaves `result.npz` or `error.json` in the folder; the line on
+stdout says how it ended: "done", "stopped" (out of time) or "crashed".
 """
 
-import io
 import json
+import os
 import resource
+import signal
 import sys
 from pathlib import Path
+from typing import Any
 
-import cascadio
-import numpy as np
-import trimesh
-
-from app.errors import AppError, UnreadableMesh
-from app.geometry.cleaning import RawSurface, clean
+from app.errors import AppError
+from app.geometry.parsing import parse
 
 MEMORY_BYTES = 6 * 2**30
 CPU_SECONDS = 120
-COARSE_SAG, FINE_SAG = 200, 2000  # STEP: an edge (probe) or the diagonal (load) over this is the allowed distance to the true surface
-ANGLE = 0.2  # rad between neighbouring facets of a STEP surface
-UNIT_NAMES = {"meters": "m", "meter": "m", "millimeters": "mm", "millimeter": "mm", "centimeters": "cm", "inches": "in", "inch": "in"}
 
 
-def parse(data: bytes, kind: str, fine: bool) -> tuple[RawSurface, dict[str, object]]:
-    """Triangles of all bodies in the scene's frame, and what the file says about itself."""
-    if kind in ("step", "iges"):
-        scene = _brep_scene(data, kind, fine)
-    else:
-        scene = trimesh.load(io.BytesIO(data), file_type=kind, process=False)
-    vertices, faces, cad_faces, skipped, bodies = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], [np.empty(0, np.int64)], 0, 0
-    offset, cad_offset = 0, 0
-    for mesh, transform in _instances(scene):
-        if not isinstance(mesh, trimesh.Trimesh):
-            skipped += 1
-            continue
-        bodies += 1
-        own = np.asarray(mesh.vertices, float) @ transform[:3, :3].T + transform[:3, 3]
-        triangles = np.asarray(mesh.faces, np.int64).reshape(-1, 3)
-        if np.linalg.det(transform[:3, :3]) < 0:
-            triangles = triangles[:, ::-1]
-        cad = np.asarray(mesh.face_attributes.get("brep_index", np.full(len(triangles), -1)), np.int64)
-        vertices.append(own)
-        faces.append(triangles + offset)
-        cad_faces.append(np.where(cad >= 0, cad + cad_offset, -1))
-        offset += len(own)
-        cad_offset += int(cad.max(initial=-1)) + 1
-    units = UNIT_NAMES.get(str(getattr(scene, "units", None) or "").lower())
-    about = {"bodies": bodies, "skipped": skipped, "units": units if kind in ("step", "iges", "glb", "3mf") else None}
-    return RawSurface(np.concatenate(vertices), np.concatenate(faces), np.concatenate(cad_faces)), about
-
-
-def _brep_scene(data: bytes, kind: str, fine: bool) -> trimesh.Scene:
-    """Triangulate a STEP or IGES file; the tolerance is absolute, so the size has to be known first."""
-    scene = _triangulate(data, kind, 1 / COARSE_SAG, relative=True)
-    diagonal = float(np.linalg.norm(scene.extents)) if scene.extents is not None else 0.0
-    if not fine or not diagonal > 0:
-        return scene
-    per_metre = 1000.0  # cascadio writes metres, but takes its tolerance in the file's unit, nearly always mm
-    return _triangulate(data, kind, diagonal * per_metre / FINE_SAG, relative=False)
-
-
-def _triangulate(data: bytes, kind: str, sag: float, relative: bool) -> trimesh.Scene:
-    glb = cascadio.load(data, file_type=kind, tol_linear=sag, tol_angular=ANGLE, tol_relative=relative, include_brep=True)  # pyright: ignore[reportArgumentType]
-    if not glb:
-        raise UnreadableMesh("The CAD kernel can't read this file: it is damaged or holds no shape. Export it again.")
-    return trimesh.load(io.BytesIO(glb), file_type="glb", process=False)  # pyright: ignore[reportReturnType]
-
-
-def _instances(scene: object) -> list[tuple[object, np.ndarray]]:
-    if not isinstance(scene, trimesh.Scene):
-        return [(scene, np.eye(4))]
-    found = []
-    for node in scene.graph.nodes_geometry:
-        transform, name = scene.graph[node]
-        found.append((scene.geometry[name], np.asarray(transform)))
-    return found
-
-
-def answer(folder: Path) -> None:
-    """Do what request.json asks and write the result."""
-    request = json.loads((folder / "request.json").read_text())
-    raw, about = parse((folder / "input").read_bytes(), request["kind"], fine=request["what"] == "load")
-    surface = clean(raw)
-    lines = list(surface.lines)
-    if about["skipped"]:
-        lines.insert(0, ("info", f"Skipped {about['skipped']} entries that are lines or points, not surfaces."))
-    np.savez(
-        folder / "result.npz", vertices=surface.vertices, faces=surface.faces.astype(np.int32), cad_face=surface.cad_face.astype(np.int32)
-    )
-    (folder / "result.json").write_text(json.dumps({**about, "closed": surface.closed, "lines": lines}))
-
-
-def main(folder: Path) -> None:
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
-    resource.setrlimit(resource.RLIMIT_CPU, (CPU_SECONDS, CPU_SECONDS))
+def answer(request: dict[str, Any]) -> None:
+    """Parse one file and write what came out of it."""
+    folder = Path(request["folder"])
     try:
-        answer(folder)
+        content = parse(Path(request["input"]).read_bytes(), request["kind"]).to_bytes()
     except AppError as error:
-        (folder / "result.json").write_text(json.dumps({"error": type(error).__name__, "detail": str(error)}))
+        (folder / "error.json").write_text(json.dumps({"error": type(error).__name__, "detail": str(error)}))
+    except MemoryError:
+        words = "Reading it needs more memory than is allowed. Export it more coarsely."
+        (folder / "error.json").write_text(json.dumps({"error": "TooLarge", "detail": words}))
+    else:
+        (folder / "result.npz").write_bytes(content)
+
+
+def run_child(request: dict[str, Any]) -> None:
+    """In the forked process: set the limits, keep quiet, answer, end without any clean-up of the parent's state."""
+    code = 1
+    try:
+        silence = os.open(os.devnull, os.O_RDWR)
+        for stream in (0, 1, 2):
+            os.dup2(silence, stream)
+        os.chdir(request["folder"])
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+        resource.setrlimit(resource.RLIMIT_CPU, (CPU_SECONDS, CPU_SECONDS))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        signal.setitimer(signal.ITIMER_REAL, request["seconds"])  # its default action ends native code, too
+        answer(request)
+        code = 0
+    finally:
+        os._exit(code)
+
+
+def main() -> None:
+    """Serve requests until stdin ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C belongs to the server, which then closes stdin
+    for line in iter(sys.stdin.buffer.readline, b""):
+        child = os.fork()
+        if child == 0:
+            run_child(json.loads(line))
+        _, status = os.waitpid(child, 0)
+        stopped = os.WIFSIGNALED(status) and os.WTERMSIG(status) in (signal.SIGALRM, signal.SIGXCPU)
+        word = "stopped" if stopped else "done" if status == 0 else "crashed"
+        sys.stdout.buffer.write(word.encode() + b"\n")
+        sys.stdout.buffer.flush()
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main()

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from app.geometry.importing import CleaningReport, ImportedPart
+from app.geometry.parsed import cad_faces_from_json, cad_faces_to_json
 from app.geometry.tool import Mesh, Region, RegionGraph, Tool
 
 MEDIA_TYPE = "application/x-npz"
@@ -61,11 +62,17 @@ def tool_from_bytes(content: bytes) -> Tool:
 def part_to_bytes(part: ImportedPart) -> bytes:
     """A cleaned part before segmentation as an .npz."""
     lines = [list(line) for line in part.report.lines]
-    return pack({"lines": lines}, vertices=part.mesh.vertices, faces=part.mesh.faces, cad_face=part.cad_face)
+    return pack(
+        {"lines": lines, "cad_faces": cad_faces_to_json(part.cad_faces)},
+        vertices=part.mesh.vertices,
+        faces=part.mesh.faces,
+        cad_face=part.cad_face,
+    )
 
 
 def part_from_bytes(content: bytes) -> ImportedPart:
     """The part that `part_to_bytes` stored."""
     words, a = unpack(content)
     report = CleaningReport(tuple((level, text) for level, text in words["lines"]))
-    return ImportedPart(Mesh(a["vertices"], a["faces"]), a["cad_face"], report)
+    cad_faces = cad_faces_from_json(words.get("cad_faces", []))
+    return ImportedPart(Mesh(a["vertices"], a["faces"]), a["cad_face"], report, cad_faces)

@@ -80,11 +80,14 @@ class ToolRow(SQLModel, table=True):
     name: str
     kind: str
     state: str
-    questions: Json | None = json_column(nullable=True)  # {units: {...} | null, up: {...} | null}
+    questions: Json | None = json_column(nullable=True)  # {units: {...} | null, up: {...} | null, body: {...} | null}
     units: str | None = None
     up: str | None = None
+    body: str | None = None  # "1", "2", ... or "all" of `bodies`; None: not chosen, or there is only one
+    bodies: list[Json] | None = json_column(nullable=True)  # what the file holds: [{id, name, extents, faces, up_guess}]
     file_name: str | None = None
     source_sha: str | None = owned("artifact.sha", nullable=True)  # the file as uploaded
+    parsed_sha: str | None = owned("artifact.sha", nullable=True)  # its triangles and bodies, not cleaned
     part_sha: str | None = owned("artifact.sha", nullable=True)  # cleaned mesh with CAD faces
     split: str | None = None
     report: list[dict[str, str]] = json_column()  # [{level, text}]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from sqlmodel import Session
 
-from app.geometry.importing import load_part
+from app.geometry.importing import ParsedFile, make_part, read_file
 from app.geometry.regions import measure
 from app.geometry.segmentation import SegmentationParameters, segment
 from app.jobs.dispatcher import Handler
@@ -28,9 +28,11 @@ class Order:
     """What to read and how to cut it."""
 
     path: str
+    parsed: str | None  # path of its triangles; None for tools from before they were kept
     file_name: str
     units: str
     up: str
+    body: str | None
     part: bytes | None  # read and cleaned before
     parameters: SegmentationParameters
 
@@ -58,14 +60,17 @@ def prepare(store: Store, session: Session, job: JobRow) -> Order | None:
         return None
     part = store.artifacts.get(row.part_sha) if row.part_sha else None
     path = str(store.artifacts.path(row.source_sha))
-    return Order(path, row.file_name or row.name, row.units, row.up, part, SegmentationParameters(**job.args))
+    parsed = str(store.artifacts.path(row.parsed_sha)) if row.parsed_sha else None
+    return Order(path, parsed, row.file_name or row.name, row.units, row.up, row.body, part, SegmentationParameters(**job.args))
 
 
 def compute(order: Order, report: Report) -> Result:
     """Read, cut and measure; pure."""
     if order.part is None:
         report(0.0, "Reading the file")
-        part = load_part(Path(order.path), order.file_name, order.units, order.up)
+        known = ParsedFile.from_bytes(Path(order.parsed).read_bytes()) if order.parsed else read_file(Path(order.path), order.file_name)
+        report(LOADED / 2, "Cleaning the surface")
+        part = make_part(known, order.units, order.up, order.body)
         start = LOADED
     else:
         part, start = part_from_bytes(order.part), 0.0

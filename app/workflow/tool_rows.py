@@ -27,6 +27,8 @@ def tool_json(session: Session, row: ToolRow) -> Json:
         "questions": row.questions,
         "units": row.units,
         "up": row.up,
+        "body": row.body,
+        "bodies": row.bodies or [],
         "file_name": row.file_name,
         "split": row.split,
         "region_count": cut.region_count if cut else None,

@@ -9,7 +9,7 @@ import trimesh
 from sqlmodel import Session
 
 from app.errors import Conflict, InvalidInput, RunActive
-from app.geometry.importing import ACCEPTED, METRES, UP, Probe, probe
+from app.geometry.importing import ACCEPTED, METRES, UP, read_file
 from app.geometry.region_table import read_region_table
 from app.geometry.segmentation import SegmentationParameters
 from app.geometry.tool import Tool
@@ -17,11 +17,12 @@ from app.jobs.rows import add_job, cancel_jobs, unfinished_job
 from app.sequencing.features import feature_set_for
 from app.storage import emit
 from app.storage.artifacts import keep
-from app.storage.conversions import tool_to_bytes
+from app.storage.conversions import MEDIA_TYPE, tool_to_bytes
 from app.storage.identity import now
 from app.storage.tables import Demonstration, Project, RegionName, Segmentation, ToolRow
 from app.workflow import import_job
 from app.workflow.context import Context
+from app.workflow.import_questions import bodies_json, check_body, notes, still_open, to_ask
 from app.workflow.lookup import check_version, found, present, ready_segmentation, run_training_on, tools_of
 from app.workflow.project_rows import checked_name
 from app.workflow.tool_rows import add_cut, tool_json, touch_tool
@@ -47,18 +48,27 @@ def get_tool(ctx: Context, tool_id: str) -> Json:
 
 
 def upload_tool(
-    ctx: Context, project_id: str, path: Path, file_name: str, name: str | None = None, units: str | None = None, up: str | None = None
+    ctx: Context,
+    project_id: str,
+    path: Path,
+    file_name: str,
+    name: str | None = None,
+    units: str | None = None,
+    up: str | None = None,
+    body: str | None = None,
 ) -> Json:
     """Add a part from a file; a file that can't be read is refused and nothing is stored.
 
-    Units are asked for where neither the file nor the caller says them, the up-direction where the caller doesn't.
+    Units are asked for where neither the file nor the caller says them, the up-direction where the caller doesn't, the body
+    where the file holds several.
     """
     _check_choices(units, up)
     name = checked_name(name if name is not None else Path(file_name).stem)
     ctx.store.read(lambda session: present(session, Project, project_id).id)
-    seen = probe(path, file_name)
-    content = path.read_bytes()
-    sha = ctx.store.artifacts.put(content)
+    parsed = read_file(path, file_name)
+    parsed.chosen(body)
+    content, triangles = path.read_bytes(), parsed.to_bytes()
+    sha, parsed_sha = ctx.store.artifacts.put(content), ctx.store.artifacts.put(triangles)
 
     def change(session: Session) -> Json:
         present(session, Project, project_id)
@@ -67,12 +77,15 @@ def upload_tool(
             name=name,
             kind="cad",
             state="asking",
-            questions=_questions(seen, units, up),
-            units=units or seen.units,
+            questions=to_ask(parsed, units, up, body),
+            units=units or parsed.units,
             up=up,
+            body=body if len(parsed.bodies) > 1 else None,
+            bodies=bodies_json(parsed),
             file_name=file_name,
             source_sha=keep(session, sha, len(content), "application/octet-stream"),
-            report=[{"level": "warning", "text": note} for note in seen.notes],
+            parsed_sha=keep(session, parsed_sha, len(triangles), MEDIA_TYPE),
+            report=notes(parsed),
         )
         return _next(session, row, {})
 
@@ -80,7 +93,7 @@ def upload_tool(
 
 
 def answer_tool(ctx: Context, tool_id: str, changes: Json, version: int | None = None) -> Json:
-    """Rename a tool, or say its units or up-direction; once both are known it is read in (again)."""
+    """Rename a tool, or say its units, up-direction or body; once all are known it is read in (again)."""
     _check_choices(changes.get("units"), changes.get("up"))
 
     def change(session: Session) -> Json:
@@ -88,14 +101,16 @@ def answer_tool(ctx: Context, tool_id: str, changes: Json, version: int | None =
         check_version(row, version)
         if changes.get("name") is not None:
             row.name = checked_name(changes["name"])
-        frame = {key: changes[key] for key in ("units", "up") if changes.get(key) is not None}
+        frame = {key: changes[key] for key in ("units", "up", "body") if changes.get(key) is not None}
         if not frame:
             touch_tool(session, row)
             return tool_json(session, row)
         if row.kind != "cad":
-            raise InvalidInput(f"{row.name} was not made from a CAD file, so it has no units or up-direction to choose.")
+            raise InvalidInput(f"{row.name} was not made from a CAD file, so it has no units, up-direction or body to choose.")
+        check_body(row, frame.get("body"))
         _refuse_while_training(session, row)
         row.units, row.up = frame.get("units", row.units), frame.get("up", row.up)
+        row.body = frame.get("body", row.body)
         row.part_sha, row.error = None, None
         cancel_jobs(session, row.id)
         return _next(session, row, {})
@@ -271,7 +286,8 @@ def mesh_glb(ctx: Context, tool_id: str) -> bytes:
 
 def _next(session: Session, row: ToolRow, params: Json) -> Json:
     """Ask what is still open, or start reading."""
-    if row.units is not None and row.up is not None:
+    open_now = still_open(row)
+    if open_now is None:
         row.state, row.questions = "importing", None
         session.add(row)
         session.flush()
@@ -283,26 +299,10 @@ def _next(session: Session, row: ToolRow, params: Json) -> Json:
             f"Reading {row.name}" if row.part_sha is None else f"Cutting {row.name}",
             params,
         )
-    elif row.questions is not None:
-        row.questions = {
-            "units": row.questions["units"] if row.units is None else None,
-            "up": row.questions["up"] if row.up is None else None,
-        }
+    else:
+        row.questions = open_now
     touch_tool(session, row)
     return tool_json(session, row)
-
-
-def _questions(seen: Probe, units: str | None, up: str | None) -> Json:
-    ask_units = {"choices": list(METRES), "guess": _guess_units(seen.extents), "extents": [float(e) for e in seen.extents]}
-    return {
-        "units": None if units or seen.units else ask_units,
-        "up": None if up else {"choices": list(UP), "guess": seen.up_guess},
-    }
-
-
-def _guess_units(extents: tuple[float, float, float]) -> str:
-    """Millimetres, unless that would make a part below a centimetre."""
-    return "mm" if max(extents) >= 10 else "m"
 
 
 def _check_choices(units: str | None, up: str | None) -> None:

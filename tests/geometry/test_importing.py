@@ -8,7 +8,8 @@ import pytest
 
 from app.errors import InvalidInput
 from app.geometry.cleaning import RawSurface, clean, weld
-from app.geometry.importing import METRES, UP, ImportedPart, load_part, probe, rotation_to_up
+from app.geometry.cleaning_report import size_words
+from app.geometry.importing import METRES, UP, ImportedPart, load_part, read_file, rotation_to_up
 from app.geometry.tool import Array
 from tests.conftest import shared
 
@@ -46,6 +47,10 @@ def sentences(part: ImportedPart, level: str) -> list[str]:
     return [sentence for which, sentence in part.report.lines if which == level]
 
 
+NOTHING_WRONG = (
+    "Looked for and not found: triangles without area, doubled triangles, triangles facing the wrong way, "
+    "edges with more than two triangles, holes."
+)
 BOX_VOLUME = 6 * 4 * 2 - 1.5 * 1 * 0.5 / 6
 
 
@@ -56,7 +61,7 @@ def test_units_scale_to_metres(units: str, metres: float, tmp_path: Path) -> Non
     assert volume(part) == pytest.approx(BOX_VOLUME * metres**3)
     assert part.mesh.vertices.dtype == np.float64
     assert part.mesh.faces.dtype == np.int32
-    assert part.report.lines[0] == ("info", f"16 triangles, {6000 * metres:.4g} × {4000 * metres:.4g} × {2000 * metres:.4g} mm.")
+    assert part.report.lines[0] == ("info", f"16 triangles, {size_words((6, 4, 2), units)}.")
     assert set(METRES) == {"mm", "cm", "m", "in"}
 
 
@@ -98,11 +103,12 @@ def test_unknown_up_direction_names_the_accepted_ones(tmp_path: Path) -> None:
         load_part(saved(tmp_path, obj(CORNERS, TRIANGLES)), "box.obj", "mm", "up")
 
 
-class TestProbe:
+class TestReadFile:
     def test_a_mesh_file_does_not_know_its_units(self, tmp_path: Path) -> None:
-        found = probe(saved(tmp_path, stl(CORNERS, TRIANGLES)), "box.stl")
-        assert found.extents == pytest.approx((6, 4, 2))
-        assert (found.units, found.bodies, found.faces, found.notes) == (None, 1, 16, ())
+        found = read_file(saved(tmp_path, stl(CORNERS, TRIANGLES)), "box.stl")
+        body = found.bodies[0]
+        assert body.extents == pytest.approx((6, 4, 2))
+        assert (found.units, len(found.bodies), body.name, body.faces, found.skipped, found.specks) == (None, 1, "Body 1", 16, 0, 0)
 
     @pytest.mark.parametrize(("order", "axis"), [((0, 1, 2), "z"), ((2, 0, 1), "x"), ((1, 2, 0), "y")])
     def test_up_is_guessed_across_the_flat_side(self, order: tuple[int, ...], axis: str, tmp_path: Path) -> None:
@@ -111,7 +117,7 @@ class TestProbe:
         faces = np.array([[2, 1, 0], [0, 3, 2], [0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
         for sign in ("+", "-"):
             turned = (corners * [1, 1 if sign == "+" else -1, 1 if sign == "+" else -1])[:, order]
-            assert probe(saved(tmp_path, obj(turned, faces)), "pyramid.obj").up_guess == sign + axis
+            assert read_file(saved(tmp_path, obj(turned, faces)), "pyramid.obj").bodies[0].up_guess == sign + axis
 
 
 class TestCleaning:
@@ -126,7 +132,7 @@ class TestCleaning:
     def test_stl_is_welded_and_says_so(self, tmp_path: Path) -> None:
         part = load_part(saved(tmp_path, stl(CORNERS, TRIANGLES)), "box.stl", "m", "+z")
         assert len(part.mesh.vertices) == 10
-        assert sentences(part, "info")[1:] == ["Joined 38 doubled corner points.", "The surface is closed."]
+        assert sentences(part, "info")[1:] == ["Joined 38 doubled corner points.", "The surface is closed.", NOTHING_WRONG]
         assert sentences(part, "warning") == []
         assert sentences(part, "repaired") == []
         assert (part.cad_face == -1).all()
@@ -138,9 +144,9 @@ class TestCleaning:
         faces[5] = faces[5, ::-1]
         part = load_part(saved(tmp_path, obj(CORNERS, faces)), "box.obj", "m", "+z")
         assert sentences(part, "repaired") == [
-            "Removed 1 triangles without area.",
-            "Removed 1 doubled triangles.",
-            "Turned 1 triangles that faced the wrong way.",
+            "Removed 1 triangle without area.",
+            "Removed 1 doubled triangle.",
+            "Turned 1 triangle that faced the wrong way.",
         ]
         assert volume(part) == pytest.approx(BOX_VOLUME)
 
@@ -153,7 +159,7 @@ class TestCleaning:
         corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0.1], [0, 1, 0.1]], float)
         part = load_part(saved(tmp_path, obj(corners, np.array([[2, 1, 0], [3, 2, 0]]))), "sheet.obj", "m", "+z")
         assert sentences(part, "repaired") == ["Turned the open surface over: it faced down."]
-        assert sentences(part, "warning") == ["The surface is open: 4 edges belong to one triangle only."]
+        assert sentences(part, "warning") == ["The surface is open: it has one border or hole, 4.01 m long."]
         a, b, c = np.moveaxis(part.mesh.vertices[part.mesh.faces], 1, 0)
         assert (np.cross(b - a, c - a)[:, 2] > 0).all()
 
@@ -161,7 +167,7 @@ class TestCleaning:
         """The second body is half as long, so it has a quarter of the area: 80 % stay."""
         vertices = np.concatenate([CORNERS, CORNERS / 2 + [20, 0, 0]])
         part = load_part(saved(tmp_path, obj(vertices, np.concatenate([TRIANGLES, TRIANGLES + 10]))), "two.obj", "m", "+z")
-        assert sentences(part, "warning") == ["Kept the largest of 2 separate bodies and left out the others (20.0 % of the area)."]
+        assert sentences(part, "refused") == ["Left out all bodies but Body 1, one of 2 (20.0 % of the area)."]
         assert len(part.mesh.faces) == 16
         assert volume(part) == pytest.approx(BOX_VOLUME)
 
@@ -182,11 +188,11 @@ class TestPublicFiles:
     def test_step_comes_in_metres_with_its_cad_faces(self) -> None:
         """featuretype.STEP is 5 x 2.5 x 1.375 inches and has 96 CAD faces."""
         path = shared("cad", "featuretype.STEP")
-        found = probe(path, "featuretype.STEP")
+        found = read_file(path, "featuretype.STEP")
         assert found.units == "m"
-        assert found.bodies == 1
-        assert found.up_guess == "+z"
-        assert found.extents == pytest.approx(np.array([5, 2.5, 1.375]) * 0.0254, rel=1e-4)
+        assert len(found.bodies) == 1
+        assert found.bodies[0].up_guess == "+z"
+        assert found.bodies[0].extents == pytest.approx(np.array([5, 2.5, 1.375]) * 0.0254, rel=1e-4)
         part = load_part(path, "featuretype.STEP", found.units, "+z")
         assert np.ptp(part.mesh.vertices, axis=0) == pytest.approx(np.array([5, 2.5, 1.375]) * 0.0254, rel=1e-4)
         assert np.unique(part.cad_face).tolist() == list(range(96))
@@ -197,7 +203,7 @@ class TestPublicFiles:
     def test_airfoil_without_units(self) -> None:
         """In mm it would be 2 mm long: said. In m it is accepted silently."""
         path = shared("cad", "naca0012.stl")
-        assert probe(path, "naca0012.stl").units is None
+        assert read_file(path, "naca0012.stl").units is None
         assert "Check the units (mm)" in sentences(load_part(path, "naca0012.stl", "mm", "+z"), "warning")[0]
         part = load_part(path, "naca0012.stl", "m", "+z")
         assert sentences(part, "warning") == []
@@ -206,7 +212,7 @@ class TestPublicFiles:
 
     def test_text_stl_of_a_tray_lies_across_y(self) -> None:
         path = shared("cad", "1002_tray_bottom.STL")
-        assert probe(path, "tray.STL").up_guess == "+y"
+        assert read_file(path, "tray.STL").bodies[0].up_guess == "+y"
         part = load_part(path, "tray.STL", "mm", "+y")
         assert np.ptp(part.mesh.vertices, axis=0) == pytest.approx([0.3556, 0.3556, 0.003175])
         assert sentences(part, "warning") == []
