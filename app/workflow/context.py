@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from app.geometry import parser_process
 from app.jobs.dispatcher import Jobs
 from app.settings import Settings
 from app.storage import Store, migrate
@@ -22,6 +23,8 @@ class Context:
         """Stop background work, finish writes, close the database."""
         self.jobs.close()
         self.store.close()
+        if self.settings.executor != "inline":
+            parser_process.shut_down()
 
 
 def open_context(settings: Settings) -> Context:
@@ -32,4 +35,6 @@ def open_context(settings: Settings) -> Context:
     jobs = Jobs(store, settings, WARM_UP)
     register(jobs, values)
     jobs.start()
+    if settings.executor != "inline":
+        parser_process.warm_up()  # the first upload would wait for it
     return Context(settings, store, jobs, values)
