@@ -1,5 +1,7 @@
 """Labelled mesh -> Tool: regions in reading order with their graph, attributes and descriptions (Sec. V)."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -34,10 +36,14 @@ def measure(mesh: Mesh, labels: NDArray[np.int32]) -> Tool:
     compact[inside] = np.unique(labels[inside], return_inverse=True)[1].ravel()
     first = find_attributes(mesh, compact)
     rank = np.argsort(reading_order(first.low[:, :2], first.high[:, :2]))
-    ordered = np.where(inside, rank[compact], -1).astype(np.int32)
-    attributes = find_attributes(mesh, ordered)
-    graph = _graph(mesh, ordered, attributes)
-    return Tool(mesh, ordered, _regions(attributes), graph)
+    return measure_labelled(mesh, np.where(inside, rank[compact], -1).astype(np.int32))
+
+
+def measure_labelled(mesh: Mesh, labels: NDArray[np.int32], names: Sequence[str] | None = None) -> Tool:
+    """Build the tool of a mesh whose regions are numbered 0, 1, ... already, and named unless letters will do."""
+    attributes = find_attributes(mesh, labels)
+    graph = _graph(mesh, labels, attributes)
+    return Tool(mesh, labels, _regions(attributes, names), graph)
 
 
 def reading_order(low: Array, high: Array) -> NDArray[np.int64]:
@@ -99,8 +105,8 @@ def _divide(matrix: Array, perimeter: Array) -> Array:
     return np.divide(matrix, perimeter, out=np.zeros_like(matrix), where=perimeter > 0)
 
 
-def _regions(attributes: Attributes) -> tuple[Region, ...]:
-    rows = zip(region_letters(len(attributes.area)), describe(attributes), strict=True)
+def _regions(attributes: Attributes, names: Sequence[str] | None) -> tuple[Region, ...]:
+    rows = zip(names or region_letters(len(attributes.area)), describe(attributes), strict=True)
     return tuple(
         Region(
             name=name,
@@ -118,4 +124,4 @@ def _regions(attributes: Attributes) -> tuple[Region, ...]:
 def warm_up() -> None:
     """Compile the fitting kernels, or load them from the cache, before somebody waits for them."""
     vertices = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.1], [1.0, 1.0, 0.0], [0.0, 1.0, 0.2]])
-    build_tree(face_sums(vertices, np.array([[0, 1, 2], [0, 2, 3]])), np.array([[0, 1]]), lambda _: None)
+    build_tree(face_sums(vertices, np.array([[0, 1, 2], [0, 2, 3]])), np.arange(2), np.array([[0, 1]]), lambda _: None)
