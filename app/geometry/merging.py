@@ -5,16 +5,14 @@ only computed again when it comes to the top. Then a textbook greedy's neighbour
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numba as nb
 import numpy as np
-from numpy.typing import NDArray
 
 from app.geometry.fitting import AREA, NORMAL_WEIGHT, fit
+from app.geometry.merge_tree import Integers, MergeTree, sums_up
 from app.geometry.tool import Array
 
-Integers = NDArray[np.int64]
 CHUNK = 20_000  # merges between two progress reports
 
 
@@ -112,37 +110,19 @@ def _advance(sums, slot, parent, key, heap_pair, n, table, weight, merges, costs
     return n, done
 
 
-@dataclass(frozen=True)
-class MergeTree:
-    """All merges in order; cutting it after any number of merges gives a partition."""
+def build_tree(sums: Array, leaf: Integers, pairs: Integers, progress: Callable[[float], None], weight: float = NORMAL_WEIGHT) -> MergeTree:
+    """Merge clusters along the neighbour pairs until nothing is left to merge.
 
-    leaves: int
-    merges: Integers  # (M, 2) clusters joined: below `leaves` a leaf, leaves + i the result of merge i
-    costs: Array  # (M,) integral cost of the joined cluster, unit diagonal
-    areas: Array  # (M,) area of the joined cluster, unit diagonal
-
-    def cut(self, clusters: int) -> Integers:
-        """Label of each leaf (leaves,) with `clusters` labels, or more when there are more connected pieces."""
-        n = min(max(0, self.leaves - clusters), len(self.merges))
-        parent = np.arange(self.leaves + n)
-        parent[self.merges[:n].ravel()] = np.repeat(self.leaves + np.arange(n), 2)
-        while True:
-            above = parent[parent]
-            if (above == parent).all():
-                break
-            parent = above
-        return np.unique(parent[: self.leaves], return_inverse=True)[1].ravel().astype(np.int64)
-
-    def clusters_within(self, tolerance: float) -> int:
-        """Fewest clusters that all stay under an RMS cost of `tolerance` diagonals."""
-        rms = np.maximum.accumulate(np.sqrt(np.maximum(self.costs, 0) / np.maximum(self.areas, 1e-300)))
-        return max(1, self.leaves - int(np.searchsorted(rms, tolerance)))
-
-
-def build_tree(sums: Array, pairs: Integers, progress: Callable[[float], None], weight: float = NORMAL_WEIGHT) -> MergeTree:
-    """Merge clusters with the given sums (L, 54) along the neighbour pairs (P, 2) until nothing is left to merge."""
+    Args:
+        sums: (L, 54) numbers of the first clusters.
+        leaf: (F,) first cluster of each face, or of whatever the tree is to label.
+        pairs: (P, 2) neighbouring clusters.
+        progress: Told the share done.
+        weight: How far a normal error of 1 counts as a distance, diagonals.
+    """
     leaves = len(sums)
     pairs = np.unique(np.sort(pairs, axis=1), axis=0).astype(np.int64) if len(pairs) else np.empty((0, 2), np.int64)
+    pairs = pairs[pairs[:, 0] != pairs[:, 1]]
     work, slot, parent = sums.copy(), np.zeros(2 * leaves, np.int64), np.arange(2 * leaves)
     slot[:leaves] = np.arange(leaves)
     key, heap_pair = np.empty(len(pairs) + 1), np.empty((len(pairs) + 1, 2), np.int64)
@@ -152,7 +132,4 @@ def build_tree(sums: Array, pairs: Integers, progress: Callable[[float], None], 
     while n > 0:
         n, done = _advance(work, slot, parent, key, heap_pair, n, table, weight, merges, costs, done, done + CHUNK)
         progress(done / max(1, leaves - 1))
-    area = np.concatenate([sums[:, AREA], np.zeros(done)])
-    for i in range(done):
-        area[leaves + i] = area[merges[i, 0]] + area[merges[i, 1]]
-    return MergeTree(leaves, merges[:done].copy(), costs[:done].copy(), area[leaves:])
+    return MergeTree(leaf.astype(np.int64), merges[:done].copy(), costs[:done].copy(), sums_up(merges[:done], sums[:, AREA]))

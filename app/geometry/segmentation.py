@@ -6,6 +6,7 @@ that can be reached from above is kept; small pieces and holes go to their surro
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,8 @@ from app.errors import InvalidInput, UnreadableMesh
 from app.geometry.cleaning import face_pairs
 from app.geometry.fitting import AREA, NORMAL_WEIGHT, SIZE, face_sums, fit
 from app.geometry.importing import ImportedPart
-from app.geometry.merging import Integers, build_tree
+from app.geometry.merge_tree import Integers, MergeTree
+from app.geometry.merging import build_tree
 from app.geometry.splitting import Surface, connected, split_large
 from app.geometry.tool import Array, Mesh
 from app.geometry.working_surface import reachable
@@ -36,6 +38,9 @@ class SegmentationParameters:
     tolerance: float = 1e-3  # allowed RMS distance to the primitives / diagonal
     minimum_area: float = 0.02  # smaller shares of the working surface (holes) go to a neighbour, while more than wanted
     most: int = 14  # regions without a target; sequencing is exact well above, people are not
+    denoise: bool = False  # smooth the normals first: for scans; it blurs the edges of clean CAD
+    absorb_fillets: bool = False  # give narrow roundings between two larger regions to these
+    preset: Literal["default", "paper-like"] = "default"  # paper-like: 6 to 14 similar patches in rows, for a layup tool
 
 
 @dataclass(frozen=True)
@@ -44,10 +49,18 @@ class Cut:
 
     part: ImportedPart
     labels: NDArray[np.int32]  # (F,) region of each face of this part, -1 outside the working surface
+    tree: MergeTree  # all merges, its `leaf` for the faces of this part; to be kept for the slider and for picking smaller clusters
+    source: Integers  # (F,) face of the part as it came that each face is, or is a piece of
 
 
-def segment(part: ImportedPart, parameters: SegmentationParameters, report: Report = ignore) -> Cut:
+def segment(part: ImportedPart, parameters: SegmentationParameters, report: Report = ignore, tree: MergeTree | None = None) -> Cut:
     """Find the regions of a part's working surface.
+
+    Args:
+        part: The cleaned part.
+        parameters: How finely to cut.
+        report: Told the progress.
+        tree: The merge tree of this very part (`part_tree`) where it was kept: then only the cut is made anew.
 
     Raises:
         InvalidInput: A parameter is out of range.
@@ -58,11 +71,10 @@ def segment(part: ImportedPart, parameters: SegmentationParameters, report: Repo
     report(0.0, "Looking for neighbouring triangles")
     pairs = face_pairs(mesh.faces)
     sums = _unit_sums(mesh)
-    leaf = _first_clusters(part.cad_face, pairs)
-    report(0.1, "Finding what can be reached from above")
+    tree = tree or part_tree(part, lambda f: report(0.2 + 0.6 * f, "Fitting planes, cylinders and spheres"))
+    report(0.8, "Finding what can be reached from above")
     seen = reachable(mesh)
-    tree = build_tree(_add_up(sums, leaf), leaf[pairs], lambda f: report(0.2 + 0.6 * f, "Fitting planes, cylinders and spheres"))
-    patch = tree.cut(tree.clusters_within(parameters.tolerance))[leaf]
+    patch = tree.cut(tolerance=parameters.tolerance)
     labels = _working_patches(patch, seen, sums[:, AREA], pairs)
     report(0.85, "Merging small pieces")
     labels = _merge_small(labels, sums, pairs, parameters.minimum_area, parameters.target or 1)
@@ -70,10 +82,18 @@ def segment(part: ImportedPart, parameters: SegmentationParameters, report: Repo
     labels = _merge_down(labels, sums, pairs, wanted)
     report(0.9, "Cutting large pieces")
     least = min(parameters.target or LEAST_REGIONS, wanted)
-    surface = split_large(Surface(mesh.vertices, mesh.faces.astype(np.int64), part.cad_face, labels), least, wanted)
+    start = Surface(mesh.vertices, mesh.faces.astype(np.int64), part.cad_face, labels, np.arange(len(labels)))
+    surface = split_large(start, least, wanted)
     report(1.0, f"{surface.labels.max() + 1} regions")
     finer = replace(part, mesh=Mesh(surface.vertices, surface.faces.astype(np.int32)), cad_face=surface.cad_face)
-    return Cut(finer, surface.labels.astype(np.int32))
+    return Cut(finer, surface.labels.astype(np.int32), tree.on(surface.source), surface.source)
+
+
+def part_tree(part: ImportedPart, progress: Callable[[float], None] = lambda _: None) -> MergeTree:
+    """Merge the faces of a part, or its CAD faces, until each connected piece is one cluster."""
+    pairs = face_pairs(part.mesh.faces)
+    leaf = _first_clusters(part.cad_face, pairs)
+    return build_tree(_add_up(_unit_sums(part.mesh), leaf), leaf, leaf[pairs], progress)
 
 
 def _check(parameters: SegmentationParameters) -> None:
@@ -162,6 +182,6 @@ def _merge_down(labels: Integers, sums: Array, pairs: Integers, wanted: int) -> 
     """Merge on until at most `wanted` regions are left."""
     if labels.max() + 1 <= wanted:
         return labels
-    tree = build_tree(_add_up(sums, labels), _label_pairs(labels, pairs), lambda _: None)
-    joined = tree.cut(wanted)
+    total = _add_up(sums, labels)
+    joined = build_tree(total, np.arange(len(total)), _label_pairs(labels, pairs), lambda _: None).cut(wanted)
     return np.where(labels >= 0, joined[labels], -1)

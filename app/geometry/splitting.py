@@ -33,6 +33,7 @@ class Surface:
     faces: Integers  # (F, 3)
     cad_face: NDArray[np.int32]  # (F,) -1 without
     labels: Integers  # (F,) region, -1 outside the working surface
+    source: Integers  # (F,) face of the part that this one is, or is a piece of
 
     def shares(self) -> Array:
         """Area of each region over that of all (N,)."""
@@ -80,7 +81,9 @@ def cut_by_plane(surface: Surface, region: int, normal: Array, offset: float) ->
     at = np.minimum(np.searchsorted(crossed, keys), len(crossed) - 1)
     middle = np.where(crossed[at] == keys, total + at, -1)
     faces, source = _subdivide(surface.faces, middle, np.concatenate([surface.vertices, points]))
-    return Surface(np.concatenate([surface.vertices, points]), faces, surface.cad_face[source], surface.labels[source])
+    return Surface(
+        np.concatenate([surface.vertices, points]), faces, surface.cad_face[source], surface.labels[source], surface.source[source]
+    )
 
 
 def _subdivide(faces: Integers, middle: Integers, vertices: Array) -> tuple[Integers, Integers]:
@@ -114,7 +117,7 @@ def _parts(shares: Array, least: int, most: int) -> Integers:
 
 def _split(surface: Surface, region: int, parts: int, spare: bool) -> tuple[Surface, int]:
     """Cut one region into parts, one more when that is `spare` and fits better; also how many more."""
-    frame, size = _rectangle(surface, region)
+    frame, size = rectangle(surface, region)
     planned, rows = _layout(parts, size[0] / max(size[1], 1e-9 * size[0]), spare)
     per_row = [planned // rows + (r < planned % rows) for r in range(rows)]
     surface, marked = _cut_along(surface, region, frame[0], np.cumsum(per_row)[:-1] / planned)
@@ -151,13 +154,13 @@ def _cut_along(surface: Surface, region: int, direction: Array, fractions: Array
     """Cut a region where the given fractions of its area lie before; also the offsets of the planes."""
     inside = surface.labels == region
     corners = surface.vertices[surface.faces[inside]] @ direction
-    offsets = _quantiles(corners, areas(surface.vertices, surface.faces[inside]), fractions)
+    offsets = quantiles(corners, areas(surface.vertices, surface.faces[inside]), fractions)
     for offset in offsets:
         surface = cut_by_plane(surface, region, direction, float(offset))
     return surface, offsets
 
 
-def _quantiles(corners: Array, area: Array, fractions: Array) -> Array:
+def quantiles(corners: Array, area: Array, fractions: Array) -> Array:
     """Positions with the given fractions of the area before, by a sweep that spreads each triangle from end to end."""
     low, high = corners.min(), corners.max()
     grid = np.linspace(low, high, 257)
@@ -177,7 +180,7 @@ def _cell(surface: Surface, inside: NDArray[np.bool_], direction: Array, offsets
     return np.searchsorted(offsets, middle).astype(np.int64)
 
 
-def _rectangle(surface: Surface, region: int) -> tuple[Array, Array]:
+def rectangle(surface: Surface, region: int) -> tuple[Array, Array]:
     """The two sides of the tightest rectangle around a region, longer first, as unit vectors (2, 3), and their lengths."""
     faces = surface.faces[surface.labels == region]
     area = areas(surface.vertices, faces)
