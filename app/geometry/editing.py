@@ -83,7 +83,7 @@ def upright_plane(tool: Tool, region: int, first: Array, second: Array) -> Array
     centres = corners.mean(axis=1)
     near = [int(np.argmin(np.linalg.norm(centres - point, axis=1))) for point in (first, second)]
     upward = (cross[near] / np.linalg.norm(cross[near], axis=1)[:, None]).sum(axis=0)
-    return np.cross(second - first, upward)
+    return np.cross(np.asarray(second - first, np.float64), np.asarray(upward, np.float64)).astype(np.float64)
 
 
 def move_piece(tool: Tool, piece: NDArray[np.bool_], to: int | None) -> Edited:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
+from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from app.geometry.slicing import Integers
@@ -104,7 +104,7 @@ def _chain(mesh: Mesh, faces: Integers, start: int, goal: int | None, count: int
     return result
 
 
-def _graph(corners: Integers, edge: Integers, count: int, places: Array, special: list[int], first: int) -> coo_matrix:
+def _graph(corners: Integers, edge: Integers, count: int, places: Array, special: list[int], first: int) -> csr_array:
     """Which points see each other across a triangle, and how far they are apart."""
     k = np.arange(count)
     rows, cols = [], []
@@ -125,7 +125,7 @@ def _graph(corners: Integers, edge: Integers, count: int, places: Array, special
         cols.append(np.array([first + 1]))
     row, col = np.concatenate(rows), np.concatenate(cols)
     weight = np.linalg.norm(places[row] - places[col], axis=1)
-    return coo_matrix((np.maximum(weight, 1e-15), (row, col)), shape=(len(places), len(places))).tocsr()
+    return csr_array(coo_array((np.maximum(weight, 1e-15), (row, col)), shape=(len(places), len(places))))
 
 
 def _around(mesh: Mesh, faces: Integers, line: SurfaceLine) -> Integers:

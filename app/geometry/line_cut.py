@@ -1,8 +1,10 @@
 """Cut a region along the shortest line through clicked points; its open ends run on to the nearest border."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.errors import InvalidInput
 from app.geometry.cleaning import face_pairs
@@ -84,16 +86,16 @@ def cut_along_line(tool: Tool, region: int, points: Array, closed: bool = False)
     return finish_division(tool, sliced, labels, region, side, "The line")
 
 
-def _under(tool: Tool, mesh: Mesh, labels: Integers, region: int, point: Array) -> int:
+def _under(tool: Tool, mesh: Mesh, labels: NDArray[np.int32], region: int, point: Array) -> int:
     face, distance = nearest_face(mesh, point, np.flatnonzero(labels == region))
     if distance > FAR * float(np.linalg.norm(np.ptp(mesh.vertices, axis=0))):
         raise InvalidInput(f"A point of the line doesn't lie on {name_of(tool, region)}. All its points have to be on one region.")
     return face
 
 
-def _legs(mesh: Mesh, inside: np.ndarray, stops: list[int], closed: bool) -> list[tuple[int, int | None]]:
+def _legs(mesh: Mesh, inside: NDArray[np.bool_], stops: list[int], closed: bool) -> list[tuple[int, int | None]]:
     """From where to where the line runs; None: to the border."""
-    between: list[tuple[int, int | None]] = list(zip(stops[:-1], stops[1:], strict=True))
+    between: list[tuple[int, int | None]] = list(pairwise(stops))
     if closed:
         return [*between, (stops[-1], stops[0])]
     on_border = {v for edge in border_edges(mesh.faces[inside]) for v in edge}
@@ -114,7 +116,7 @@ def _after_split(edges: Integers, split: Integers, middle: Integers) -> Integers
     return np.array(result)
 
 
-def _over_edges(faces: Integers, pairs: Integers, edges: Integers, total: int) -> np.ndarray:
+def _over_edges(faces: Integers, pairs: Integers, edges: Integers, total: int) -> NDArray[np.bool_]:
     """Pairs of faces (P,) whose common edge is one of `edges`."""
     first, second = faces[pairs[:, 0]], faces[pairs[:, 1]]
     common = (first[:, :, None] == second[:, None, :]).any(axis=2)
