@@ -73,7 +73,7 @@ def locate(here: Mesh, there: Mesh) -> tuple[Integers, Array]:
 def _keys(here: Mesh, there: Mesh, size: float) -> tuple[Integers, Integers]:
     """Equal numbers for equal triangles of the two meshes."""
     corners = np.concatenate([np.rint(m.vertices[m.faces] / (GRID * size)).astype(np.int64) for m in (here, there)])
-    points, number = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+    _, number = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
     triple = np.sort(number.reshape(-1, 3), axis=1)
     _, key = np.unique(triple, axis=0, return_inverse=True)
     key = key.ravel().astype(np.int64)
