@@ -6,8 +6,7 @@ Paper:
     The scripted expert of the synthetic tools weighs all ten features alike, which the paper's project page states; of the real tools'
         expert nothing is known, so only orders with the recorded order's feature sum count as just as good. Both prefer the recorded order
         to every equivalent one.
-    A hit is a recorded order in the lowest cost class (relative 1e-7) of at most 64 orders, or of equivalent orders only. Without the
-        size rule weights under which everything ties would hit everywhere.
+    A hit is defined in `hits`.
 """
 
 import re
@@ -23,21 +22,19 @@ from app.geometry.region_table import RegionTable, read_region_table
 from app.learning.coverage import CoverageReport, coverage
 from app.learning.effort import EffortParameters, EffortStepResult, effort_step, start_effort
 from app.learning.expert import ScriptedExpert
+from app.learning.hits import HIT_GAP, HIT_SIZE, judge
 from app.learning.performance import performance_step, start_performance
 from app.learning.performance_state import LearningDemonstration, PerformanceParameters, StepResult
 from app.learning.policy import Policy
 from app.learning.prediction import predict
-from app.sequencing.classes import class_size, equivalent_sequences
-from app.sequencing.comparison import kendall_tau
 from app.sequencing.features import Interaction
 from app.sequencing.problem import SequencingProblem, problem_for
 
 Kind = Literal["synthetic", "real"]
+__all__ = ["HIT_GAP", "HIT_SIZE", "StudyReport", "ToolResult", "run_study"]
 
 TRAINED_ON = {"synthetic": (1, 2, 3, 6, 8, 9), "real": (1, 2, 3, 4, 5, 6)}
 INTERACTIONS: dict[str, tuple[Interaction, ...]] = {"synthetic": (), "real": ()}
-HIT_GAP = 1e-7  # relative
-HIT_SIZE = 64
 
 
 @dataclass(frozen=True)
@@ -185,15 +182,5 @@ def _teach_effort(demonstrations: list[LearningDemonstration], learned: StepResu
 
 
 def _evaluate(number: int, problem: SequencingProblem, recorded: tuple[int, ...], trained: bool, policy: Policy) -> ToolResult:
-    best = predict(problem, policy)
-    scale = max(abs(best.cost), 1e-12)
-    gap = (problem.cost(policy.weights, recorded) - best.cost) / scale
-    size = class_size(problem, policy.weights)
-    lowest = gap <= HIT_GAP
-    hit = lowest and (size <= HIT_SIZE or _only_equivalents(problem, recorded, size))
-    return ToolResult(number, problem.n, trained, hit, size, gap, kendall_tau(best.sequence, recorded))
-
-
-def _only_equivalents(problem: SequencingProblem, recorded: tuple[int, ...], size: int) -> bool:
-    omega = equivalent_sequences(problem, recorded, cap=size + 1)
-    return omega.complete and len(omega.sequences) == size
+    found = judge(problem, policy.weights, recorded, predict(problem, policy).sequence)
+    return ToolResult(number, problem.n, trained, found.hit, found.class_size, found.gap, found.tau)
