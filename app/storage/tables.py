@@ -89,6 +89,7 @@ class ToolRow(SQLModel, table=True):
     source_sha: str | None = owned("artifact.sha", nullable=True)  # the file as uploaded
     parsed_sha: str | None = owned("artifact.sha", nullable=True)  # its triangles and bodies, not cleaned
     part_sha: str | None = owned("artifact.sha", nullable=True)  # cleaned mesh with CAD faces
+    tree_sha: str | None = owned("artifact.sha", nullable=True)  # the merge tree of that mesh
     split: str | None = None
     report: list[dict[str, str]] = json_column()  # [{level, text}]
     error: Json | None = json_column(nullable=True)  # {error, detail}
@@ -98,7 +99,10 @@ class ToolRow(SQLModel, table=True):
 
 
 class Segmentation(SQLModel, table=True):
-    """One immutable cut of a tool into regions; sequences name the segmentation they were clicked on."""
+    """One immutable cut of a tool into regions; sequences name the segmentation they were clicked on.
+
+    Only the pointers change: `current` is where the tool stands in its history, `redo_id` where a redo leads from here.
+    """
 
     __table_args__ = (
         CheckConstraint("region_count >= 1", name="region_count"),
@@ -111,6 +115,14 @@ class Segmentation(SQLModel, table=True):
     region_count: int
     feature_set: str
     current: bool = True
+    parent_id: str | None = owned("segmentation.id", nullable=True)  # the cut this one was made from by an edit
+    redo_id: str | None = owned("segmentation.id", nullable=True)
+    kind: str = Field(
+        default="cut", sa_column_kwargs={"server_default": "cut"}
+    )  # of the edit: merge, split_plane, ..., or cut for a cut by parameters
+    words: str = Field(default="Read in", sa_column_kwargs={"server_default": "Read in"})  # the edit, for people: "Merged B and C"
+    locked: list[int] = Field(default_factory=list, sa_column=Column(JSON(none_as_null=True), nullable=False, server_default="[]"))
+    hidden: list[int] = Field(default_factory=list, sa_column=Column(JSON(none_as_null=True), nullable=False, server_default="[]"))
     created_at: str = Field(default_factory=now)
 
 
