@@ -1,92 +1,223 @@
 """Sequences of tools with more regions than the exact dynamic program can hold: best found, not proved.
 
-Every cost depends on the set of finished regions only, so with everything before and after a stretch fixed, the best order
-inside it is an exact dynamic program over the subsets of the stretch. A beam search gives the start; stretches are
-re-ordered and single regions moved until nothing improves.
+Many starts (beams, and sweeps over the tool in plain patterns) descend by exact re-ordering of stretches; the best of them
+then lose a few regions at a time and get them back where the whole is cheapest (`window.reinsert`), with a block moved
+elsewhere whenever nothing has helped for a while. Deterministic for a seed; the best order so far only ever gets cheaper.
 """
 
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
 import numpy as np
-from numpy.typing import NDArray
 
 from app.geometry.tool import Array
-from app.sequencing.features import Sets
-from app.sequencing.problem import SequencingProblem, all_sets
+from app.sequencing.beam import beam
+from app.sequencing.constraints import Resolved, resolve
+from app.sequencing.problem import SequencingProblem
+from app.sequencing.transitions import Model, model_of
+from app.sequencing.window import Order, order_cost, reinsert
 
-BEAM_WIDTH = 100
-STRETCHES = (8, 9)  # regions re-ordered at a time, one whole descent each
-SWEEPS = 40  # at most, over all stretches
-IMPROVES = 1e-9  # relative gain below which a sweep counts as no improvement
+IMPROVES = 1e-9  # relative gain below which a move counts as no improvement
 
-
-def best_found(problem: SequencingProblem, w: Array) -> tuple[int, ...]:
-    """The cheapest sequence of several descents; deterministic."""
-    w = problem.check_weights(w)
-    starts = [beam(problem, w, BEAM_WIDTH), beam(problem, w, 1)]
-    found = [improve(problem, w, start, size) for start in starts for size in STRETCHES]
-    return min(found, key=lambda s: (problem.cost(w, s), s))
+Report = Callable[[float, float], None]  # (share of the budget used, cost of the best order so far)
 
 
-def step_costs(problem: SequencingProblem, w: Array, done: Sets) -> Array:
-    """Cost of every next region for each set (M, N), infinite where already done."""
-    return np.where(done, np.inf, problem.values(done) @ w)
+@dataclass(frozen=True)
+class Effort:
+    """How long to search."""
+
+    moves: int = 900  # re-insertions after the descents
+    beams: tuple[int, ...] = (1, 10, 100)
+    stretch: int = 8  # regions re-ordered at a time in a descent
+    taken: int = 6  # regions taken out at a time afterwards
+    reach: int = 24  # positions they are taken from
+    patience: int = 60  # moves without gain before a block is moved
+    kept: int = 3  # descents that are searched further
 
 
-def beam(problem: SequencingProblem, w: Array, width: int) -> tuple[int, ...]:
-    """Beam search over prefixes, one representative (the cheapest) per set of finished regions."""
-    n = problem.n
-    code = np.random.default_rng(5).integers(1, 2**62, n)  # a set is known by the xor of its members' codes
-    done, cost, key = np.zeros((1, n), np.bool_), np.zeros(1), np.zeros(1, np.int64)
-    back: list[tuple[NDArray[np.int64], NDArray[np.int64]]] = []
-    for _ in range(n):
-        total = cost[:, None] + step_costs(problem, w, done)
-        parent, action = np.nonzero(np.isfinite(total))
-        value, new_key = total[parent, action], key[parent] ^ code[action]
-        order = np.lexsort((action, value, new_key))
-        order = order[np.concatenate([[True], np.diff(new_key[order]) != 0])]
-        order = order[np.argsort(value[order], kind="stable")[:width]]
-        parent, action = parent[order], action[order]
-        done = done[parent].copy()
-        done[np.arange(len(order)), action] = True
-        cost, key = value[order], new_key[order]
-        back.append((parent, action))
-    at, sequence = int(np.argmin(cost)), []
-    for parent, action in reversed(back):
-        sequence.append(int(action[at]))
-        at = int(parent[at])
-    return tuple(reversed(sequence))
+NORMAL = Effort()
 
 
-def improve(problem: SequencingProblem, w: Array, sequence: tuple[int, ...], size: int) -> tuple[int, ...]:
-    """Re-order stretches of `size` regions exactly, over and over, until a whole sweep gains nothing."""
-    size = min(size, problem.n)
-    starts = sorted({*range(0, problem.n - size + 1, max(1, size // 3)), problem.n - size})
-    cost = problem.cost(w, sequence)
-    for _ in range(SWEEPS):
-        for start in starts:
-            sequence = reorder(problem, w, sequence, start, size)
-        lower = problem.cost(w, sequence)
-        if lower > cost - IMPROVES * max(1e-300, abs(cost)):
+class Search:
+    """One tool, one set of weights: costs of orders of the free regions, moves on them."""
+
+    def __init__(self, problem: SequencingProblem, w: Array, resolved: Resolved, seed: int) -> None:
+        self.n, self.rng = problem.n, np.random.default_rng(seed)
+        self.model: Model = model_of(problem, w)
+        self.before, self.never_next = resolved.before, resolved.never_next
+        self.done, self.free = np.zeros(problem.n, np.bool_), np.array(resolved.free, np.int64)
+        self.done[list(resolved.done)] = True
+        self.last_done = resolved.done[-1] if resolved.done else -1
+        self.penalty = 1.0 + 10 * float(np.abs(self.model.w).sum() + np.abs(self.model.v).sum()) * problem.n
+        centre = (problem.graph.low + problem.graph.high) / 2
+        self.near = np.argsort(((centre[:, None] - centre) ** 2).sum(axis=-1), axis=1, kind="stable")
+        self.centre, self.height = centre, problem.graph.height
+
+    def cost(self, order: Order) -> float:
+        """The order's cost, plus a penalty for every forbidden neighbour."""
+        return float(order_cost(self.model, order, self.done)) + self.penalty * self.broken(order)
+
+    def broken(self, order: Order) -> int:
+        """Pairs that must not follow each other but do."""
+        chain = order if self.last_done < 0 else np.concatenate([[self.last_done], order])
+        return int(self.never_next[chain[:-1], chain[1:]].sum())
+
+    def reinsert(self, order: Order, start: int, stop: int, taken: Order) -> Order:
+        """The best order that moves only the regions at the positions `taken`."""
+        out = np.empty_like(order)
+        reinsert(self.model, order, self.done, self.before, start, stop, taken, out)
+        return out
+
+    def allowed(self, order: Order) -> bool:
+        """Whether every region comes after those that must precede it."""
+        place = np.empty(self.n, np.int64)
+        place[order] = np.arange(len(order))
+        a, b = np.nonzero(self.before)
+        return bool((place[a] < place[b]).all())
+
+    def sorted_by(self, key: Array) -> Order:
+        """The free regions by `key`, each as soon as those that must precede it are there."""
+        waiting, order = {int(a) for a in self.free}, []
+        while waiting:
+            ready = [a for a in waiting if not any(self.before[b, a] for b in waiting)]
+            order.append(min(ready, key=lambda a: (key[a], a)))
+            waiting.remove(order[-1])
+        return np.array(order, np.int64)
+
+    def sweeps(self) -> Iterator[Order]:
+        """Row by row and column by column from every corner, to and fro, by height, and from the middle outwards."""
+        x, y = ((self.centre - self.centre.min(axis=0)) / np.maximum(np.ptp(self.centre, axis=0), 1e-12)).T
+        for along, across in ((x, y), (y, x)):
+            band = np.round(across, 3)
+            lane = np.unique(band, return_inverse=True)[1]
+            for lanes in (lane, lane.max() - lane):
+                for way in (along, 1 - along):
+                    yield self.sorted_by(lanes * 10 + way)
+                    yield self.sorted_by(lanes * 10 + np.where(lanes % 2, 1 - way, way))
+        yield self.sorted_by(self.height)
+        yield self.sorted_by(-self.height)
+        yield self.sorted_by((x - 0.5) ** 2 + (y - 0.5) ** 2)
+
+    def descend(self, order: Order, size: int) -> tuple[float, Order]:
+        """Re-order stretches of `size` regions exactly, over and over, until a whole sweep gains nothing."""
+        size = min(size, len(order))
+        starts = sorted({*range(0, len(order) - size + 1, max(1, size // 2)), len(order) - size})
+        cost = self.cost(order)
+        while True:
+            before = cost
+            for start in starts:
+                trial = self.reinsert(order, start, start + size, np.arange(start, start + size))
+                value = self.cost(trial)
+                if value < cost:
+                    cost, order = value, trial
+            if cost > before - IMPROVES * max(1e-300, abs(before)):
+                return cost, order
+
+    def move(self, order: Order, effort: Effort) -> Order:
+        """Take some regions out, near each other in the order or on the tool, and put them back best."""
+        n, kind = len(order), self.rng.random()
+        k = min(effort.taken, n)
+        if kind < 0.35:
+            reach = min(effort.reach, n)
+            start = int(self.rng.integers(n - reach + 1))
+            return self.reinsert(order, start, start + reach, start + np.sort(self.rng.choice(reach, k, replace=False)))
+        if kind < 0.6:
+            k = min(k + 2, n)
+            start = int(self.rng.integers(n - k + 1))
+            return self.reinsert(order, start, start + k, np.arange(start, start + k))
+        place = np.full(self.n, -1)
+        place[order] = np.arange(n)
+        at = int(self.rng.integers(n))
+        near = place[self.near[order[at]]]
+        near = near[(near >= 0) & (np.abs(near - at) <= effort.reach // 2)][: k + 5]
+        taken = np.sort(self.rng.choice(near, min(k, len(near)), replace=False))
+        return self.reinsert(order, max(0, int(taken[0]) - 2), min(n, int(taken[-1]) + 3), taken)
+
+    def shake(self, order: Order) -> Order:
+        """A block moved elsewhere, perhaps turned round; the order itself where that is not allowed."""
+        n = len(order)
+        i, j = np.sort(self.rng.choice(n + 1, 2, replace=False))
+        j = min(j, i + max(1, n // 3))
+        block, rest = order[i:j], np.concatenate([order[:i], order[j:]])
+        block = block[::-1] if self.rng.random() < 0.5 else block
+        at = int(self.rng.integers(len(rest) + 1))
+        moved = np.concatenate([rest[:at], block, rest[at:]])
+        return moved if self.allowed(moved) else order
+
+
+def best_found(
+    problem: SequencingProblem,
+    w: Array,
+    resolved: Resolved | None = None,
+    seed: int = 0,
+    effort: Effort = NORMAL,
+    should_stop: Callable[[], bool] = lambda: False,
+    report: Report = lambda _share, _cost: None,
+) -> tuple[int, ...]:
+    """The cheapest order found; regions finished before come first in it, skipped ones are left out.
+
+    Args:
+        problem: The tool and its features.
+        w: Weights, shape (n + m,).
+        resolved: Constraints.
+        seed: Other seeds may find other orders; the same seed always finds the same.
+        effort: How long to search.
+        should_stop: Asked after every move; the best order so far is returned when it says so.
+        report: Told after every gain and at the end.
+    """
+    r = resolved or resolve(None, problem.n)
+    search = Search(problem, problem.check_weights(w), r, seed)
+    if not len(search.free):
+        return r.done
+    found: list[tuple[float, tuple[int, ...]]] = []
+    for start in _starts(search, problem, w, r, effort):
+        cost, order = search.descend(start, effort.stretch)
+        if not found or cost < min(found)[0]:
+            report(0.0, cost)
+        found.append((cost, tuple(order.tolist())))
+        if should_stop():
+            return r.done + min(found)[1]
+    best = sorted(set(found))[: effort.kept]
+    lowest = best[0]
+    for turn, begin in enumerate(best):
+        lowest = min(lowest, _wander(search, begin, effort, (turn, len(best)), lowest[0], should_stop, report))
+    report(1.0, lowest[0])
+    return r.done + lowest[1]
+
+
+def _starts(search: Search, problem: SequencingProblem, w: Array, r: Resolved, effort: Effort) -> Iterator[Order]:
+    for width in effort.beams:
+        yield np.array(beam(problem, w, width, r), np.int64)
+    yield from search.sweeps()
+
+
+def _wander(
+    search: Search,
+    begin: tuple[float, tuple[int, ...]],
+    effort: Effort,
+    turn: tuple[int, int],
+    lowest: float,
+    should_stop: Callable[[], bool],
+    report: Report,
+) -> tuple[float, tuple[int, ...]]:
+    """Moves from one start, the best order met."""
+    cost, order = begin[0], np.array(begin[1], np.int64)
+    best, best_order, idle = cost, order, 0
+    moves = effort.moves // turn[1]
+    for i in range(moves):
+        if should_stop():
             break
-        cost = lower
-    return sequence
-
-
-def reorder(problem: SequencingProblem, w: Array, sequence: tuple[int, ...], start: int, size: int) -> tuple[int, ...]:
-    """The best order of positions start .. start + size - 1 with everything else fixed."""
-    items = np.array(sequence[start : start + size])
-    inside = all_sets(size)
-    done = np.zeros((len(inside), problem.n), np.bool_)
-    done[:, list(sequence[:start])] = True
-    done[:, items] = inside
-    cost = step_costs(problem, w, done)[:, items]
-    to_go, choice = np.zeros(len(inside)), np.zeros(len(inside), np.int64)
-    count = inside.sum(axis=1)
-    for layer in range(size - 1, -1, -1):
-        states = np.flatnonzero(count == layer)
-        total = cost[states] + to_go[states[:, None] | (1 << np.arange(size))]
-        to_go[states], choice[states] = total.min(axis=1), total.argmin(axis=1)
-    state, order = 0, []
-    for _ in range(size):
-        order.append(int(items[choice[state]]))
-        state |= 1 << int(choice[state])
-    return sequence[:start] + tuple(order) + sequence[start + size :]
+        trial = search.move(order, effort)
+        value = search.cost(trial)
+        idle = 0 if value < cost - IMPROVES * abs(cost) else idle + 1
+        if value <= cost + IMPROVES * abs(cost):
+            cost, order = value, trial
+        if cost < best - IMPROVES * abs(best):
+            best, best_order = cost, order
+            if best < lowest:
+                report((turn[0] + i / moves) / turn[1], best)
+        if idle > effort.patience:
+            idle = 0
+            order = search.shake(best_order if search.rng.random() < 0.7 else order)
+            cost = search.cost(order)
+    return best, tuple(best_order.tolist())

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from app.geometry.tool import GraphSource
 from app.sequencing import kernels
 from app.sequencing.comparison import kendall_tau
-from app.sequencing.large import beam, best_found, improve, reorder
+from app.sequencing.large import best_found
 from app.sequencing.problem import problem_for
 from app.sequencing.shortest import TIE_CAP, cost_to_go, shortest_sequence
 from tests.sequencing.graphs import every_order, grid_graph
@@ -68,37 +68,6 @@ def test_twenty_regions_are_proved_and_better_than_any_descent():
     assert exact.proved
     assert "1,048,576" in exact.method
     assert exact.cost <= problem.cost(w, best_found(problem, w)) + 1e-9
-
-
-def test_beam_that_holds_every_set_is_exact():
-    problem, w = problem_for(grid_graph(2, 4, 3)), np.random.default_rng(2).normal(size=13)
-    assert problem.cost(w, beam(problem, w, 70)) == pytest.approx(shortest_sequence(problem, w).cost)
-
-
-def test_one_stretch_over_everything_is_exact():
-    problem, w = problem_for(grid_graph(2, 4, 3)), np.random.default_rng(2).normal(size=13)
-    assert problem.cost(w, reorder(problem, w, tuple(range(8)), 0, 8)) == pytest.approx(shortest_sequence(problem, w).cost)
-
-
-def test_reorder_keeps_the_rest_and_never_gets_worse():
-    problem, w = problem_for(grid_graph(2, 4, 9)), np.random.default_rng(4).normal(size=13)
-    order = (3, 1, 4, 0, 5, 7, 2, 6)
-    better = reorder(problem, w, order, 2, 4)
-    assert better[:2] == order[:2]
-    assert better[6:] == order[6:]
-    assert sorted(better) == list(range(8))
-    assert problem.cost(w, better) <= problem.cost(w, order) + 1e-12
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_improving_goes_on_until_no_stretch_gains(seed: int):
-    rng = np.random.default_rng(seed)
-    problem, w, order = problem_for(grid_graph(4, 4, seed)), rng.normal(size=13), tuple(rng.permutation(16).tolist())
-    found = improve(problem, w, order, 3)
-    cost = problem.cost(w, found)
-    assert cost < problem.cost(w, order)
-    for start in range(14):  # the stretches that a sweep tries
-        assert problem.cost(w, reorder(problem, w, found, start, 3)) == pytest.approx(cost, abs=1e-8)
 
 
 def test_large_tools_are_not_called_proved():
