@@ -5,7 +5,7 @@
 
 const TYPES = [
   "tool.changed", "job.progress", "draft.changed", "demonstration.changed", "coverage.changed", "run.changed", "query.changed", "policy.changed",
-  "plan.changed", "playback.changed", "session.picked", "scene.changed", "project.changed",
+  "plan.changed", "playback.changed", "session.picked", "session.editing", "scene.changed", "project.changed",
 ];
 const RETRY_MS = 2000;
 

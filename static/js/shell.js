@@ -152,6 +152,8 @@ export async function boot() {
   return shell;
 }
 
+const QUIET = new Set(["session.picked", "session.editing", "scene.changed", "draft.changed"]); // say nothing about the project
+
 async function open(shell) {
   try {
     await shell.refresh();
@@ -160,7 +162,7 @@ async function open(shell) {
     throw error;
   }
   const again = gathered(() => shell.refresh().catch(complain), 300);
-  listen("*", (type) => type !== "session.picked" && type !== "scene.changed" && type !== "draft.changed" && again());
+  listen("*", (type) => !QUIET.has(type) && again());
   listen("resync", again);
   connect(shell.projectId);
 }

@@ -4,17 +4,21 @@
 //   view.show({ mode: "sequence", tool_id, sequence, step }, "Trough 10 with your order after step 4");
 //   view.onPicked((region) => ...);
 //
+//   view.show({ mode: "edit", tool_id }, ...)    view.change({ selection: [2, 3] })    view.onEditing((state) => ...)
+//   view.onUnder((region) => ...)                what lies under the pointer, while editing
+//
 // The host is a .stage element; the frame is laid under what else it holds. For screen readers the view is one image with the
 // sentence given to `show`; the lists beside it say and do the same. The session id is kept in sessionStorage per project and
 // name, so a reload finds its view again. Scenes are sent one at a time and only the latest waiting one, so dragging a slider
-// never builds a queue. The theme goes along as `dark`.
+// never builds a queue; changes of what is edited are merged until they can go, always after the scene they belong to. The theme goes along as `dark`.
 
-import { get, post, put } from "./api.js";
+import { get, patch, post, put } from "./api.js";
 import { h } from "./dom.js";
 import { listen } from "./events.js";
 import { adopt } from "./keys.js";
 import { isDark } from "./shell.js";
 import { complain } from "./toasts.js";
+import { Under } from "./under.js";
 
 export class View3D {
   constructor(host, { projectId, name = "main" }) {
@@ -24,8 +28,10 @@ export class View3D {
     host.prepend(this.box);
     this.session = null;
     this.wanted = null;
+    this.changes = null;
     this.sending = false;
     this.sent = "";
+    this.under = null;
     this.ready = this.open().catch((error) => this.fail(error));
     addEventListener("themechange", () => this.scene && this.show(this.scene, this.sentence));
     listen("resync", () => {
@@ -55,6 +61,7 @@ export class View3D {
 
   loaded() {
     adopt(this.frame.contentWindow);
+    this.under?.attach(this.frame, this.session.id);
     this.box.querySelector(".view3d-wait")?.remove();
     this.frame.classList.add("shown");
   }
@@ -66,6 +73,7 @@ export class View3D {
 
   // Shows a scene (see the REST description of sessions) and says it in a sentence.
   show(scene, sentence) {
+    if (scene.tool_id !== this.scene?.tool_id || scene.mode !== this.scene?.mode) this.changes = null;
     this.scene = scene;
     this.sentence = sentence;
     this.box.setAttribute("aria-label", sentence);
@@ -77,19 +85,45 @@ export class View3D {
     if (this.sending || !this.session) return;
     this.sending = true;
     try {
-      while (this.wanted) {
-        const scene = this.wanted;
-        this.wanted = null;
-        const text = JSON.stringify(scene);
-        if (text === this.sent) continue;
-        await put(`/sessions/${encodeURIComponent(this.session.id)}/scene`, scene);
-        this.sent = text;
-      }
+      while (this.wanted || this.changes) await (this.wanted ? this.sendScene() : this.sendChanges());
     } catch (error) {
       complain(error);
     } finally {
       this.sending = false;
     }
+  }
+
+  async sendScene() {
+    const scene = this.wanted;
+    this.wanted = null;
+    const text = JSON.stringify(scene);
+    if (text === this.sent) return;
+    await put(`/sessions/${encodeURIComponent(this.session.id)}/scene`, scene);
+    this.sent = text;
+  }
+
+  async sendChanges() {
+    const changes = this.changes;
+    this.changes = null;
+    const session = await patch(`/sessions/${encodeURIComponent(this.session.id)}/scene`, changes);
+    if (!this.changes && !this.wanted) this.told?.(session.scene);
+  }
+
+  // Mode edit: another selection, way of pointing, points, level or hover.
+  change(values) {
+    this.changes = { ...this.changes, ...values };
+    return this.flush();
+  }
+
+  // The state of mode edit after every change of it, from wherever it came; not while a change of ours is on its way.
+  onEditing(handler) {
+    this.told = handler;
+    return listen("session.editing", (state) => state.session_id === this.session?.id && !this.changes && handler(state));
+  }
+
+  onUnder(handler) {
+    this.under = new Under(handler);
+    if (this.frame?.classList.contains("shown")) this.under.attach(this.frame, this.session.id);
   }
 
   // Robot playback: action "play", "pause" or "seek".

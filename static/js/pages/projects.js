@@ -216,7 +216,7 @@ try {
   bind({ key: "n", name: "New project", run: openForm });
   connect(null);
   const again = gathered(() => load().catch(complain), 500);
-  listen("*", (type) => type !== "session.picked" && type !== "scene.changed" && again());
+  listen("*", (type) => !type.startsWith("session.") && type !== "scene.changed" && again());
   listen("resync", again);
 } catch (error) {
   showFault(shell.main, error);

@@ -1,102 +1,76 @@
-// The panel of one tool: what its import asks, how far it is, why it failed, or its regions.
+// The panel beside the 3D view: tabs for regions, history and (in narrow windows) all tools; while a tool is being imported its
+// questions, its progress, or why it failed.
 
-import { patch, post } from "../api.js";
 import { fill, h } from "../dom.js";
 import { icon } from "../icons.js";
-import { tint } from "../ramp.js";
-import { renameable } from "../rename.js";
-import { fixed, number, plural } from "../words.js";
-
-const METRES = { mm: 0.001, cm: 0.01, m: 1, in: 0.0254 };
-const UNIT_WORDS = { mm: "Millimetres", cm: "Centimetres", m: "Metres", in: "Inches" };
-const LEVELS = { info: ["info", ""], repaired: ["check", "ok"], warning: ["warn", "warn"] };
-
-// "120 x 80 x 32 mm": what the part would measure if the file were written in this unit.
-export function sizeIn(unit, extents) {
-  const metres = extents.map((length) => length * METRES[unit]);
-  const large = Math.max(...metres) >= 1;
-  return `${metres.map((length) => number(large ? length : length * 1000)).join(" \u00d7 ")} ${large ? "m" : "mm"}`;
-}
-
-function upWords(direction) {
-  const axis = direction[1].toUpperCase();
-  return direction[0] === "+" ? `${axis} up` : `${axis} down`;
-}
-
-// The whole text on hover, but only where the column cuts it.
-function tipWhenCut({ currentTarget: cell }) {
-  if (cell.scrollWidth > cell.clientWidth) cell.dataset.tip = cell.textContent;
-  else delete cell.dataset.tip;
-}
+import { plural } from "../words.js";
+import { importQuestions } from "./import_questions.js";
+import { CutPanel } from "./tools-cut.js";
+import { History, OldDemonstrations, reportList } from "./tools-history.js";
+import { RegionTable } from "./tools-regions.js";
 
 export class ToolPanel {
-  constructor({ onHighlight, onChanged, onDelete, reload }) {
-    this.onHighlight = onHighlight;
-    this.onChanged = onChanged;
-    this.onDelete = onDelete;
-    this.reload = reload;
-    this.node = h("aside.card.fill", { "aria-label": "Tool" });
-    this.shown = "";
+  // list: the node with all tools, shown here as a tab unless the window is wide enough for a column of its own.
+  constructor({ editor, list, onChanged, onCarried, reload }) {
+    Object.assign(this, { editor, list, onChanged, reload });
+    this.table = new RegionTable(editor, { onRenamed: reload });
+    this.history = new History(editor);
+    this.old = new OldDemonstrations({ onCarried });
+    this.cut = new CutPanel({ onTool: onChanged });
+    this.tabs = h("div.segmented", { role: "group", "aria-label": "What the panel shows" });
+    this.export = h("a.icon-btn.push", { "aria-label": "Download the regions as CSV", dataset: { tip: "Download the regions as CSV", key: "csv" }, download: "" }, icon("download"));
+    this.body = h("div.fill", { style: { flex: "1" } });
+    this.node = h("aside.card.fill", { "aria-label": "Tool" }, h("div.card-head", {}, this.tabs, this.export), this.body);
+    this.regions = [this.old.node, this.table.node, this.cut.node];
+    this.tab = "regions";
+    this.wide = false;
+    this.inside = "";
   }
 
-  show(tool, regions, highlight) {
-    const key = JSON.stringify([tool.id, tool.state, tool.version, tool.name, tool.segmentation_id, tool.report, tool.error, regions.map((region) => region.name), document.documentElement.dataset.theme]);
+  show(tool) {
     this.tool = tool;
-    if (key !== this.shown && !this.node.querySelector(".rename input, .ask-form")) this.draw(tool, regions);
-    else if (key !== this.shown && !(tool.state === "asking" && this.asked === tool.id)) this.draw(tool, regions);
-    this.shown = key;
-    this.asked = tool.state === "asking" ? tool.id : null;
-    this.mark(highlight);
+    this.drawTabs();
+    const tab = this.tab === "tools" && !this.wide ? "tools" : tool.state === "ready" ? this.tab.replace("tools", "regions") : tool.state;
+    const inside = tab === "asking" ? `asking:${tool.id}:${JSON.stringify(tool.questions)}` : tab === "failed" ? `failed:${tool.id}` : tab;
+    if (inside !== this.inside) {
+      this.inside = inside;
+      fill(this.body, this.content(tab, tool));
+    }
     if (tool.job) this.progress(tool.job);
+    if (tool.state !== "ready") return;
+    this.table.draw();
+    this.cut.show(tool);
   }
 
-  draw(tool, regions) {
-    const body = { asking: () => this.questions(tool), importing: () => this.importing(tool), failed: () => this.failed(tool), ready: () => this.ready(tool, regions) }[tool.state]();
-    fill(this.node, this.head(tool), body);
+  content(tab, tool) {
+    if (tab === "tools") return this.list;
+    if (tab === "asking") return h("div.scroll", {}, importQuestions(tool, { onChanged: this.onChanged, reload: this.reload }));
+    if (tab === "importing") return this.importing(tool);
+    if (tab === "failed") return this.failed(tool);
+    return tab === "history" ? this.history.node : this.regions;
   }
 
-  head(tool) {
-    const name = renameable(tool.name, "tool", async (wanted) => {
-      this.onChanged(await patch(`/tools/${encodeURIComponent(tool.id)}`, { name: wanted }, this.tool.version));
-    }, "h2.rename");
-    return h("div.card-head", {}, name, h("span.push.small.muted.num", {}, tool.state === "ready" ? plural(tool.region_count, "region") : ""),
-      h("button.icon-btn", { type: "button", "aria-label": `Delete ${tool.name}`, dataset: { tip: "Delete", key: "delete" }, onclick: this.onDelete }, icon("trash")));
+  // Reads what belongs to the cut that is shown.
+  async load(tool) {
+    await Promise.all([this.history.load(tool), this.old.load(tool)]);
   }
 
-  // ---- questions -------------------------------------------------------------------------------------------------------------
-
-  questions(tool) {
-    const { units, up } = tool.questions ?? {};
-    const fault = h("p.error-text", { role: "alert" });
-    const button = h("button.btn.primary", { type: "submit" }, "Cut it into regions");
-    const submit = async (event) => {
-      event.preventDefault();
-      const answers = Object.fromEntries(new FormData(event.currentTarget));
-      button.disabled = true;
-      try {
-        const changed = await patch(`/tools/${encodeURIComponent(tool.id)}`, answers, this.tool.version);
-        this.asked = null;
-        this.onChanged(changed);
-      } catch (error) {
-        fault.textContent = error.message;
-        button.disabled = false;
-        if (error.status === 412) this.reload();
-      }
-    };
-    return h("div.scroll", {}, h("form.ask-form", { onsubmit: submit }, units ? this.unitChoices(units) : null, up ? this.upChoices(up) : null, fault, button));
+  mark() {
+    this.table.mark();
   }
 
-  unitChoices(units) {
-    return h("fieldset", {}, h("legend", {}, "How large is it?"), units.choices.map((unit) => h("label.choice", {}, h("input", { type: "radio", name: "units", value: unit, required: true, checked: unit === (units.guess ?? "mm") }),
-      UNIT_WORDS[unit] ?? unit, h("span.size", {}, sizeIn(unit, units.extents)))));
+  choose(tab) {
+    this.tab = tab;
+    this.show(this.tool);
   }
 
-  upChoices(up) {
-    return h("fieldset", {}, h("legend", {}, "Which side is worked on?"), h("p.small.muted", {}, "The direction that points up, towards the hand or the robot."),
-      h("div.choices-row", {}, up.choices.map((direction) => h("label.choice", {}, h("input", { type: "radio", name: "up", value: direction, required: true, checked: direction === up.guess }), upWords(direction)))));
+  drawTabs() {
+    const ready = this.tool.state === "ready";
+    const tab = (key, words) => h("button", { type: "button", "aria-pressed": String(this.tab === key || (key === "regions" && this.tab === "tools" && this.wide)), dataset: { key: `tab-${key}` }, onclick: () => this.choose(key) }, words);
+    fill(this.tabs, tab("regions", ready ? plural(this.tool.region_count, "region") : "Import"), ready && this.tool.edit ? tab("history", "History") : null, this.wide ? null : tab("tools", "All tools"));
+    this.export.hidden = !ready;
+    this.export.href = `/api/v1/tools/${encodeURIComponent(this.tool.id)}/regions.csv`;
   }
-
-  // ---- import and failure ------------------------------------------------------------------------------------------------------
 
   importing(tool) {
     const words = h("span", {}, tool.job?.message || "Reading the file");
@@ -115,64 +89,6 @@ export class ToolPanel {
 
   failed(tool) {
     return h("div.card-body.stack", {}, h("div.note.bad", { role: "alert" }, icon("warn"), h("p", {}, tool.error?.detail ?? "The import failed.")),
-      h("p.small.muted", {}, "Nothing was kept of it but this entry. Delete it, or upload a corrected file."), this.report(tool));
-  }
-
-  // ---- regions -----------------------------------------------------------------------------------------------------------------
-
-  ready(tool, regions) {
-    const table = h("table.region-table", {}, h("thead", {}, h("tr", {}, h("th", {}, "Region"), h("th", {}, "Where"), h("th.num", { dataset: { tip: "Surface area, cm\u00b2" } }, "cm\u00b2"),
-      h("th.num", { dataset: { tip: "Highest point: 0 is the lowest of the working surface, 1 the highest" } }, "Height"), h("th.num", { dataset: { tip: "Strongest curvature, 1/m; positive is convex" } }, "1/m"))),
-    h("tbody", {}, regions.map((region) => this.row(tool, region))));
-    table.addEventListener("pointerleave", () => this.onHighlight(null));
-    return [h("div.scroll.table-wrap", {}, table), this.report(tool), tool.kind === "table" ? null : this.cutAgain(tool)];
-  }
-
-  row(tool, region) {
-    const name = renameable(region.name, "region", async (wanted) => {
-      await patch(`/tools/${encodeURIComponent(tool.id)}/regions/${region.id}`, { name: wanted });
-      region.name = wanted;
-      this.reload();
-    });
-    return h("tr", { tabindex: "0", dataset: { region: region.id, key: `region-${region.id}` }, onpointerenter: () => this.onHighlight(region.id), onfocus: () => this.onHighlight(region.id), onclick: () => this.onHighlight(region.id) },
-      h("td.nowrap", {}, h("span.swatch.pastel", { style: { "--swatch": tint(region.id) } }), name), h("td.words", { onpointerenter: tipWhenCut }, region.description),
-      h("td.num", {}, fixed(region.area_mm2 / 100)), h("td.num", {}, fixed(region.height, 2)), h("td.num", {}, fixed(region.curvature_per_m)));
-  }
-
-  mark(region, scroll = false) {
-    for (const row of this.node.querySelectorAll("tr[data-region]")) {
-      const chosen = Number(row.dataset.region) === region && region !== null;
-      row.setAttribute("aria-selected", String(chosen));
-      if (chosen && scroll) row.scrollIntoView({ block: "nearest" });
-    }
-  }
-
-  report(tool) {
-    if (!tool.report.length) return null;
-    const warnings = tool.report.filter((line) => line.level === "warning").length;
-    const words = warnings ? plural(warnings, "thing to look at", "things to look at") : plural(tool.report.length, "line");
-    return h("details.drawer", { style: { "border-top": "1px solid var(--line)" } }, h("summary", {}, icon("right", "caret"), h("h2", {}, "How it was read"), h("span", { style: { "margin-left": "auto" } }, words)),
-      h("ul.report", {}, tool.report.map((line) => h("li", {}, icon(...(LEVELS[line.level] ?? LEVELS.info)), h("span", {}, line.text)))));
-  }
-
-  cutAgain(tool) {
-    const field = h("input.field", { type: "number", min: "1", max: "200", step: "1", value: tool.region_count ?? "", "aria-label": "Number of regions", dataset: { key: "target" } });
-    const fault = h("span.error-text", { role: "alert" });
-    const cut = async (event) => {
-      event.preventDefault();
-      fault.textContent = "";
-      const target = field.value === "" ? null : Number(field.value);
-      if (target !== null && !(Number.isInteger(target) && target >= 1 && target <= 200)) {
-        field.setAttribute("aria-invalid", "true");
-        fault.textContent = "Between 1 and 200 regions, or empty to let the surface decide.";
-        return;
-      }
-      try {
-        this.onChanged(await post(`/tools/${encodeURIComponent(tool.id)}/segmentations`, target === null ? {} : { target }));
-      } catch (error) {
-        fault.textContent = error.message;
-      }
-    };
-    return h("form.cut-row", { onsubmit: cut, novalidate: true }, h("label", {}, "Regions"), field, h("button.btn.small", { type: "submit", dataset: { tip: "Saved demonstrations keep the cut they were recorded on" } }, "Cut again"), fault);
+      h("p.small.muted", {}, "Nothing was kept of it but this entry. Delete it, or upload a corrected file."), tool.report.length ? reportList(tool.report) : null);
   }
 }

@@ -1,216 +1,161 @@
-// Tools: the list, uploads by button or drop, and for the chosen tool its 3D view with lettered regions and its panel.
+// Tools: uploads by button or drop, the tool in 3D with its regions, and everything that changes these regions.
 
-import { all, get, post, remove, upload } from "../api.js";
+import { all, get, patch, post, remove } from "../api.js";
 import { fill, h } from "../dom.js";
 import { gathered, listen } from "../events.js";
 import { icon } from "../icons.js";
 import { bind } from "../keys.js";
+import { renameable } from "../rename.js";
 import { boot, pageAddress, query, remember, showFault } from "../shell.js";
 import { complain, toast } from "../toasts.js";
 import { View3D } from "../view3d.js";
-import { bytes, plural, sentence, spoken } from "../words.js";
+import { plural, sentence, spoken } from "../words.js";
+import { uploadExtras } from "./import_questions.js";
 import { letterKeys } from "./region-letters.js";
+import { Editor } from "./tools-editor.js";
+import { KINDS, drawTools } from "./tools-list.js";
+import { MODES } from "./tools-modes.js";
 import { ToolPanel } from "./tools-panel.js";
+import { Toolbar } from "./tools-toolbar.js";
+import { CAD, Uploads } from "./tools-upload.js";
 
-const CAD = [".step", ".stp", ".iges", ".igs", ".stl", ".obj", ".ply", ".off", ".glb", ".3mf"];
-const KINDS = { cad: "CAD", table: "region table", sample: "sample" };
+const WIDE = "(min-width: 1500px)";
 
 const shell = await boot();
-const state = { tools: [], tool: null, regions: [], highlight: null, uploads: [], view: null, segmentation: null };
+const state = { tools: [], tool: null, view: null };
+const uploads = new Uploads({ projectId: shell.projectId, onDone: async (tool) => {
+  await load(tool.id);
+} });
+const editor = new Editor({ onChange: repaint, onTool: replaceTool, onRename: (region) => {
+  panel.choose("regions");
+  panel.table.edit(region);
+}, onOutdated: () => freshen(state.tool.id) });
+const toolbar = new Toolbar(editor);
+const tools = h("div.tool-list");
+const list = h("div.fill", { style: { flex: "1" } }, uploads.node, h("div.scroll", {}, tools), uploadExtras());
+const column = h("nav.card.fill", { "aria-label": "Tools" });
+const panel = new ToolPanel({ editor, list, onChanged: (tool) => replaceTool(tool).catch(complain), onCarried: () => load(), reload: () => load().catch(complain) });
 const head = h("div.head");
-const list = h("div.tool-list");
-const sending = h("div", { role: "status" });
-const stage = h("section.stage", { "aria-label": "3D view" });
-const caption = h("div.tl");
 const cover = h("div.empty", { hidden: true });
-const cad = h("input", { type: "file", hidden: true, multiple: true, id: "cad-file", accept: CAD.join(","), onchange: () => take(cad) });
-const table = h("input", { type: "file", hidden: true, multiple: true, id: "table-file", accept: ".csv,text/csv", onchange: () => take(table) });
-const panel = new ToolPanel({ onHighlight: highlight, onChanged: (tool) => replaceTool(tool), onDelete: () => discard(state.tool).catch(complain), reload: () => load().catch(complain) });
-
-// ---- uploads -----------------------------------------------------------------------------------------------------------------
-
-function take(input) {
-  const files = [...input.files];
-  input.value = "";
-  sendAll(files, input === table);
-}
-
-async function sendAll(files, asTable = false) {
-  for (const file of files) await sendOne(file, asTable || /\.csv$/i.test(file.name));
-}
-
-async function sendOne(file, asTable) {
-  const entry = { name: file.name, size: file.size, fraction: 0, fault: "" };
-  state.uploads.push(entry);
-  drawUploads();
-  try {
-    const base = `/projects/${encodeURIComponent(shell.projectId)}/tools`;
-    const tool = await upload(asTable ? `${base}/region-table` : base, { file }, (fraction) => {
-      entry.fraction = fraction;
-      drawUploads();
-    });
-    state.uploads.splice(state.uploads.indexOf(entry), 1);
-    await load();
-    await open(tool.id);
-  } catch (error) {
-    entry.fault = error.message;
-  }
-  drawUploads();
-}
-
-function dismiss(entry) {
-  state.uploads.splice(state.uploads.indexOf(entry), 1);
-  drawUploads();
-}
-
-function uploadRow(entry) {
-  if (entry.fault) {
-    return h("div.upload-row", {}, h("div.note.bad", { role: "alert" }, icon("warn"), h("span", {}, entry.fault.includes(entry.name) ? null : [h("b.strong", {}, entry.name), ": "], entry.fault)),
-      h("button.btn.quiet.small", { type: "button", style: { "justify-self": "start" }, onclick: () => dismiss(entry) }, "Dismiss"));
-  }
-  const percent = Math.round(entry.fraction * 100);
-  const words = entry.fraction < 1 ? bytes(entry.size) : "checking";
-  return h("div.upload-row", {}, h("div.progress-line", {}, h("span", {}, entry.name), h("span.muted", {}, words),
-    h("div.progress", { role: "progressbar", "aria-label": `Sending ${entry.name}`, "aria-valuemin": 0, "aria-valuemax": 100, "aria-valuenow": percent, style: { "--value": `${percent}%` } }, h("i"))));
-}
-
-const drawUploads = () => fill(sending, state.uploads.map(uploadRow));
-
-function dropping() {
-  const files = (event) => [...(event.dataTransfer?.types ?? [])].includes("Files");
-  let depth = 0;
-  const show = () => shell.main.classList.toggle("dropping", depth > 0);
-  addEventListener("dragenter", (event) => {
-    if (!files(event)) return;
-    depth += 1;
-    show();
-  });
-  addEventListener("dragleave", (event) => {
-    if (!files(event)) return;
-    depth = Math.max(0, depth - 1);
-    show();
-  });
-  addEventListener("dragover", (event) => files(event) && event.preventDefault());
-  addEventListener("drop", (event) => {
-    if (!files(event)) return;
-    event.preventDefault();
-    depth = 0;
-    show();
-    sendAll([...event.dataTransfer.files]);
-  });
-}
+const stage = h("section.stage", { "aria-label": "3D view" }, h("div.tl", {}, toolbar.hint), h("div.bc", {}, toolbar.finish), cover);
+const body = h("div.tools-frame", {}, h("div.workbench", {}, toolbar.node, stage), panel.node);
 
 // ---- painting ----------------------------------------------------------------------------------------------------------------
 
-function nextStep() {
-  const { tool } = state;
-  if (!tool || tool.state !== "ready") return null;
-  const known = tool.demonstrated;
-  return h(`div.next${known ? ".calm" : ""}`, {}, h("p", {}, h("span.kicker", {}, known ? "" : "Next: record it"), known ? `${tool.name} has a demonstration` : `${tool.name} has ${plural(tool.region_count, "region")}`),
-    h(`a.btn${known ? "" : ".primary"}`, { href: pageAddress(shell.projectId, "record", { tool: tool.id }), dataset: { key: "record" } }, known ? "Show its order" : "Record it"));
+function nextWords(tool) {
+  if (tool.state === "asking") return { kicker: "Next: answer on the right", words: "then it is cut into regions" };
+  if (tool.state !== "ready") return null;
+  if (panel.old.carriable) return { kicker: "Next: carry it over", words: "its demonstration is on an older cut", run: () => panel.old.carry(panel.old.carriable), label: "Carry over" };
+  const record = pageAddress(shell.projectId, "record", { tool: tool.id });
+  if (panel.old.items.length) return { kicker: "Next: record it again", words: "its demonstration is on an older cut", href: record, label: "Record it" };
+  if (tool.demonstrated) return { calm: true, kicker: "", words: "It has a demonstration", href: record, label: "Show its order" };
+  return { kicker: "Next: record it", words: `once its ${plural(tool.region_count, "region")} look right`, href: record, label: "Record it" };
 }
+
+// Only one thing is orange: while a mode waits to be finished, its button.
+function nextStep() {
+  const next = state.tool && nextWords(state.tool);
+  if (!next) return null;
+  const editing = MODES[editor.mode].edit && !editor.missing;
+  const tone = next.calm || editing ? "" : ".primary";
+  const button = next.href ? h(`a.btn${tone}`, { href: next.href, dataset: { key: "next" } }, next.label) : next.run ? h(`button.btn${tone}`, { type: "button", dataset: { key: "next" }, onclick: next.run }, next.label) : null;
+  return h(`div.next${next.calm || editing ? ".calm" : ""}`, {}, h("p", {}, h("span.kicker", {}, next.kicker), next.words), button);
+}
+
+function titleOf(tool) {
+  const ready = state.tools.filter((entry) => entry.state === "ready").length;
+  const done = state.tools.filter((entry) => entry.demonstrated).length;
+  const count = `${sentence(spoken(ready, "tool"))} ready, ${done} demonstrated.`;
+  const name = renameable(tool.name, "tool", async (wanted) => replaceTool(await patch(`/tools/${encodeURIComponent(tool.id)}`, { name: wanted }, state.tool.version)), "h1.rename");
+  return h("div.title", {}, name, h("p", {}, `${sentence(KINDS[tool.kind])}${tool.file_name ? `, ${tool.file_name}` : ""}. ${count}`));
+}
+
+let headShown = "";
 
 function drawHead() {
-  const ready = state.tools.filter((tool) => tool.state === "ready").length;
-  const done = state.tools.filter((tool) => tool.demonstrated).length;
-  const words = state.tools.length ? `${sentence(spoken(ready, "tool"))} ready, ${done} demonstrated.` : "The parts you work on.";
-  fill(head, h("div.title", {}, h("h1", {}, "Tools"), h("p", {}, words)), h("span", { style: { "margin-left": "auto" } }),
-    h("button.btn", { type: "button", dataset: { key: "upload", tip: `${CAD.map((end) => end.slice(1).toUpperCase()).join(", ")}` }, onclick: () => cad.click() }, icon("upload"), "Upload"),
-    h("button.btn", { type: "button", dataset: { key: "table", tip: "CSV in the layout of the published region tables" }, onclick: () => table.click() }, icon("table"), "Region table"), nextStep());
+  const { tool } = state;
+  const key = JSON.stringify([tool, state.tools.map((entry) => [entry.state, entry.demonstrated]), panel.old.items, editor.mode, editor.missing]);
+  if (key === headShown || head.querySelector(".title input")) return;
+  headShown = key;
+  fill(head, tool ? titleOf(tool) : h("div.title", {}, h("h1", {}, "Tools"), h("p", {}, "The parts you work on.")),
+    h("span", { style: { "margin-left": "auto" } }), h("div.head-actions", {}, h("button.btn", { type: "button", dataset: { key: "upload", tip: `${CAD.map((end) => end.slice(1).toUpperCase()).join(", ")}` }, onclick: () => uploads.cad.click() }, icon("upload"), "Upload"),
+      h("button.icon-btn", { type: "button", "aria-label": "Import a region table", dataset: { key: "table", tip: "Import a region table (CSV or JSON)" }, onclick: () => uploads.table.click() }, icon("table")),
+      tool ? h("button.icon-btn", { type: "button", "aria-label": `Delete ${tool.name}`, dataset: { tip: "Delete this tool", key: "delete" }, onclick: () => discard(tool).catch(complain) }, icon("trash")) : null), nextStep());
   head.querySelector(".next")?.style.setProperty("margin-left", "0");
-}
-
-const MARKS = { asking: ["info", "ask"], importing: ["half", ""], failed: ["warn", "bad"] };
-const STATE_WORDS = { asking: "asks a question", importing: "importing", failed: "could not be read" };
-
-function toolRow(tool) {
-  const words = tool.state === "ready" ? [plural(tool.region_count, "region"), tool.split ?? KINDS[tool.kind]].join(", ") : STATE_WORDS[tool.state];
-  const [name, tone] = MARKS[tool.state] ?? (tool.demonstrated ? ["check", "ok"] : ["ring", ""]);
-  const tip = tool.state === "ready" ? (tool.demonstrated ? "Demonstrated" : "Not demonstrated yet") : sentence(STATE_WORDS[tool.state]);
-  const percent = Math.round((tool.job?.fraction ?? 0) * 100);
-  return h("a", { href: `?tool=${encodeURIComponent(tool.id)}`, dataset: { key: `tool-${tool.id}`, tip }, "aria-current": tool.id === state.tool?.id ? "true" : null, onclick: (event) => {
-    event.preventDefault();
-    open(tool.id).catch(complain);
-  } }, h("span.tool-name", {}, tool.name), h("small", {}, words), icon(name, tone), h("span.visually-hidden", {}, tip),
-  tool.state === "importing" ? h("div.progress", { style: { "--value": `${percent}%` } }, h("i")) : null);
-}
-
-function drawList() {
-  fill(list, state.tools.map(toolRow));
 }
 
 const COVERS = {
   asking: (tool) => ["How large is it, and which way is up?", `${tool.file_name ?? tool.name} does not say. Answer on the right, then it is cut into regions.`],
-  importing: (tool) => ["Cutting it into regions", tool.job?.message ?? "This takes a few seconds."],
+  importing: (tool) => ["Cutting it into regions", tool.job?.message || "This takes a few seconds."],
   failed: () => ["There is nothing to show", "The file could not be used; the reason is on the right."],
 };
 
 function drawStage() {
   const { tool } = state;
-  const words = tool ? COVERS[tool.state]?.(tool) : null;
+  const words = COVERS[tool.state]?.(tool);
   cover.hidden = !words;
+  toolbar.node.hidden = !tool.edit;
   if (words) fill(cover, h("h2", {}, words[0]), h("p", {}, words[1]));
-  fill(caption, tool?.state === "ready" ? h("span.hint.plate", {}, "Hover a row or click a region") : null);
-  if (!tool || tool.state !== "ready") return state.view.show({ mode: "empty", tool_id: null }, "No tool is shown");
-  return state.view.show({ mode: "tool", tool_id: tool.id, highlight: state.highlight === null ? [] : [state.highlight] }, `3D view of ${tool.name} with ${plural(tool.region_count, "lettered region")}`);
+  if (tool.state !== "ready") return state.view.show({ mode: "empty", tool_id: null }, "No tool is shown");
+  return state.view.show({ mode: tool.edit ? "edit" : "tool", tool_id: tool.id }, `3D view of ${tool.name} with ${plural(tool.region_count, "lettered region")}`);
 }
 
 function draw() {
-  drawHead();
-  drawList();
-  if (!state.tool) return;
-  shell.crumb(state.tool.name, () => state.tools.map((tool) => ({ label: tool.name, note: KINDS[tool.kind], current: tool.id === state.tool.id, run: () => open(tool.id).catch(complain) })));
-  panel.show(state.tool, state.regions, state.highlight);
+  const { tool } = state;
+  drawTools(tools, state.tools, tool.id, (id) => open(id).catch(complain));
+  shell.crumb(tool.name, () => state.tools.map((entry) => ({ label: entry.name, note: KINDS[entry.kind], current: entry.id === tool.id, run: () => open(entry.id).catch(complain) })));
   drawStage();
+  repaint();
 }
 
-function highlight(region, fromView = false) {
-  if (state.highlight === region) return;
-  state.highlight = region;
-  panel.mark(region, fromView);
-  if (state.tool?.state === "ready") drawStage();
+// What follows the editor; a mere hover touches no more than the row.
+function repaint(what = "") {
+  if (!state.tool) return;
+  if (what === "hover") return panel.mark();
+  toolbar.draw();
+  panel.show(state.tool);
+  return drawHead();
 }
 
 // ---- reading and changing ------------------------------------------------------------------------------------------------------
 
-async function readRegions() {
-  const { tool } = state;
-  if (tool.state !== "ready") {
-    state.regions = [];
-    state.segmentation = null;
-    return;
-  }
-  const regions = await all(`/tools/${encodeURIComponent(tool.id)}/regions`);
-  if (state.tool.id !== tool.id) return;
-  state.regions = regions.sort((a, b) => a.id - b.id);
-  state.segmentation = tool.segmentation_id;
+async function readRegions(tool) {
+  if (tool.state !== "ready") return editor.show(tool, []);
+  const [regions] = await Promise.all([all(`/tools/${encodeURIComponent(tool.id)}/regions`)]);
+  if (state.tool?.id !== tool.id) return undefined;
+  editor.show(tool, regions.sort((a, b) => a.id - b.id));
+  return panel.load(tool);
 }
 
 async function open(id) {
   const tool = state.tools.find((entry) => entry.id === id);
   if (!tool) return;
+  const other = tool.id !== state.tool?.id;
   state.tool = tool;
-  state.highlight = null;
+  if (other && panel.tab === "tools") panel.tab = "regions";
   remember("tool", id);
-  await readRegions();
+  await readRegions(tool);
+  if (state.tool.id !== id) return;
   draw();
-  list.querySelector("[aria-current]")?.scrollIntoView({ block: "nearest" });
+  if (other && tool.state === "ready") editor.enter("select");
+  tools.querySelector("[aria-current]")?.scrollIntoView({ block: "nearest" });
 }
 
 async function replaceTool(tool) {
   const at = state.tools.findIndex((entry) => entry.id === tool.id);
   if (at >= 0) state.tools[at] = tool;
-  if (state.tool?.id !== tool.id) return drawList();
+  if (state.tool?.id !== tool.id) return drawTools(tools, state.tools, state.tool?.id, (id) => open(id).catch(complain));
   state.tool = tool;
-  await readRegions();
+  await readRegions(tool);
   return draw();
 }
 
 async function discard(tool) {
   await remove(`/tools/${encodeURIComponent(tool.id)}`, tool.version);
   const at = state.tools.findIndex((entry) => entry.id === tool.id);
+  const next = state.tools[at + 1]?.id ?? state.tools[at - 1]?.id;
   state.tool = null;
-  await load(state.tools[at + 1]?.id ?? state.tools[at - 1]?.id);
+  await load(next);
   toast(`${tool.name} deleted`, { undo: async () => {
     await post(`/tools/${encodeURIComponent(tool.id)}/restore`);
     await load(tool.id);
@@ -221,71 +166,83 @@ async function load(wanted = state.tool?.id) {
   state.tools = await all(`/projects/${encodeURIComponent(shell.projectId)}/tools`);
   const tool = state.tools.find((entry) => entry.id === wanted) ?? state.tools[0];
   if (!tool) return showEmpty();
-  if (!body.isConnected) fill(shell.main, head, body, cad, table);
-  state.view ??= openView();
+  if (!body.isConnected) fill(shell.main, head, body, uploads.inputs);
+  if (!state.view) {
+    state.view = new View3D(stage, { projectId: shell.projectId, name: "tools" });
+    editor.attach(state.view);
+  }
   await open(tool.id);
   return undefined;
 }
 
-function openView() {
-  const view = new View3D(stage, { projectId: shell.projectId, name: "tools" });
-  view.onPicked((region) => highlight(region, true));
-  return view;
-}
-
-const body = h("div.tools-frame", {}, h("nav.card.fill", { "aria-label": "Tools" }, h("div.card-head", {}, h("h2", {}, "All tools")), sending, h("div.scroll", {}, list),
-  h("p.drop-note", {}, "Drop CAD files or region tables anywhere on this page.")), stage, panel.node);
-stage.append(caption, cover);
-
 function showEmpty() {
   state.tool = null;
+  headShown = "";
   drawHead();
   fill(shell.main, head, h("div.empty", { style: { flex: "1", "align-content": "center" } }, icon("cube"), h("h2", {}, "Bring the first part"),
     h("p", {}, "Drop a STEP, STL, OBJ, PLY, GLB or 3MF file here, or a region table. It is cleaned and cut into regions."),
-    h("button.btn.primary", { type: "button", onclick: () => cad.click() }, "Upload a tool")), sending, cad, table);
+    h("button.btn.primary", { type: "button", onclick: () => uploads.cad.click() }, "Upload a tool")), uploads.node, uploads.inputs);
 }
 
 // One tool changed: read that one, not all.
 async function freshen(id) {
   try {
     const tool = await get(`/tools/${encodeURIComponent(id)}`);
-    if (state.tools.some((entry) => entry.id === id)) await replaceTool(tool);
-    else await load();
+    const known = state.tools.find((entry) => entry.id === id);
+    if (!known) await load();
+    else if (JSON.stringify(known) !== JSON.stringify(tool) || id === state.tool?.id) await replaceTool(tool);
   } catch (error) {
     if (error.status === 404) await load();
     else complain(error);
   }
 }
 
+function progress(id, job) {
+  const tool = state.tools.find((entry) => entry.id === id);
+  if (!tool || tool.state !== "importing") return;
+  tool.job = job;
+  drawTools(tools, state.tools, state.tool?.id, (other) => open(other).catch(complain));
+  if (tool.id !== state.tool?.id) return;
+  panel.progress(job);
+  drawStage();
+}
+
+// The list of tools has a column of its own in a wide window; in a narrow one it is a tab of the panel.
+function arrange() {
+  const wide = matchMedia(WIDE).matches;
+  if (wide) fill(column, h("div.card-head", {}, h("h2", {}, "All tools")), list);
+  if (wide) body.prepend(column);
+  else column.remove();
+  panel.wide = wide;
+  panel.inside = "";
+  if (state.tool) panel.show(state.tool);
+}
+
 async function start() {
+  arrange();
+  matchMedia(WIDE).addEventListener("change", arrange);
   await load(query("tool") ?? shell.project.next_step.tool_id);
-  dropping();
-  letterKeys({ regions: () => state.regions, pick: (region) => highlight(region, true), name: "Point at a region" });
-  bind({ key: "u", ctrl: false, alt: true, shown: "Alt U", name: "Upload a tool", run: () => cad.click() });
-  bind({ key: "Escape", name: "Point at nothing", when: () => state.highlight !== null, run: () => highlight(null) });
+  uploads.acceptDrops(shell.main);
+  letterKeys({ regions: () => editor.regions, pick: (region) => editor.select([region]), name: "Select a region" });
+  bind({ key: "u", ctrl: false, alt: true, shown: "Alt U", name: "Upload a tool", run: () => uploads.cad.click() });
+  listenToAll();
+}
+
+function listenToAll() {
   const changed = new Set();
   const fresh = gathered(() => {
     for (const id of changed) freshen(id);
     changed.clear();
   }, 150);
-  listen("tool.changed", ({ tool_id: id }) => {
+  const about = ({ tool_id: id }) => {
     changed.add(id);
     fresh();
-  });
+  };
+  listen("tool.changed", about);
+  listen("demonstration.changed", about);
   listen("job.progress", ({ subject_id: id, job_id: job, fraction, message }) => progress(id, { id: job, fraction, message }));
   listen("resync", () => load().catch(complain));
-  addEventListener("themechange", draw);
-}
-
-function progress(id, job) {
-  const tool = state.tools.find((entry) => entry.id === id);
-  if (!tool || tool.state !== "importing") return;
-  tool.job = job;
-  drawList();
-  if (tool.id === state.tool?.id) {
-    panel.progress(job);
-    drawStage();
-  }
+  addEventListener("themechange", () => state.tool && draw());
 }
 
 try {

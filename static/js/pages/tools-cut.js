@@ -1,0 +1,148 @@
+// How finely the tool is cut: one slider from few to many regions that answers while it moves, two presets, the rest behind "More".
+
+import { post } from "../api.js";
+import { fill, h } from "../dom.js";
+import { icon } from "../icons.js";
+import { plural } from "../words.js";
+
+const RANGE = { least: 1, most: 40 };
+const NO_TREE = 409;
+
+const FIELDS = [
+  { key: "tolerance", words: "Fit error allowed", unit: "% of its size", share: 100, usual: 0.1, tip: "How far a region may bend away from a plane, cylinder, cone or sphere" },
+  { key: "minimum_area", words: "Smallest region", unit: "% of the area", share: 100, usual: 2, tip: "Smaller ones go to their neighbour" },
+];
+const SWITCHES = [
+  { key: "denoise", words: "It is a scan: smooth the noise first", tip: "Blurs the edges of clean CAD" },
+  { key: "absorb_fillets", words: "Give narrow roundings to their neighbours", tip: "A rounding between two larger regions is shared by them" },
+];
+
+export class CutPanel {
+  // onTool(tool): answered at once or under way.
+  constructor({ onTool }) {
+    this.onTool = onTool;
+    this.tool = null;
+    this.wanted = null;
+    this.sending = false;
+    this.slider = h("input", { type: "range", step: "1", "aria-label": "Number of regions", dataset: { key: "few-many" }, oninput: () => this.slide() });
+    this.value = h("output.num");
+    this.presets = h("div.presets");
+    this.fault = h("p.error-text", { role: "alert" });
+    this.more = this.form();
+    this.opener = h("button.more-open", { type: "button", "aria-expanded": "false", "aria-controls": "cut-more", onclick: () => this.open(this.more.hidden) }, "More", icon("right", "caret"));
+    this.node = h("section.cut-panel", { "aria-label": "How finely it is cut" }, h("div.few-many", {}, h("span", {}, "Few"), this.slider, h("span", {}, "Many"), this.value, this.opener), this.presets, this.more, this.fault);
+  }
+
+  show(tool) {
+    const other = tool.id !== this.tool?.id;
+    this.tool = tool;
+    this.node.hidden = tool.kind === "table";
+    const { least, most } = tool.edit?.slider ?? RANGE;
+    this.slider.min = String(least);
+    this.slider.max = String(Math.max(most, tool.region_count));
+    this.slider.disabled = !tool.edit?.editable;
+    this.slider.dataset.tip = tool.edit?.why_not ?? "";
+    if (other) {
+      this.fault.textContent = "";
+      this.open(false);
+    }
+    if (!this.sending && this.wanted === null) this.say(tool.region_count);
+    this.drawPresets();
+  }
+
+  say(count) {
+    this.slider.value = String(count);
+    this.told(count);
+  }
+
+  told(count) {
+    this.value.textContent = String(count);
+    this.slider.setAttribute("aria-valuetext", plural(count, "region"));
+  }
+
+  open(wanted) {
+    this.more.hidden = !wanted;
+    this.opener.setAttribute("aria-expanded", String(wanted));
+  }
+
+  drawPresets() {
+    const off = !this.tool.edit?.editable;
+    const preset = (words, key, params, tip) => h("button.btn.small", { type: "button", disabled: off, dataset: { key, tip }, onclick: () => this.order(params) }, words);
+    fill(this.presets, preset("Paper-like: 6\u201314 regions", "paper-like", { preset: "paper-like" }, "Similar patches in rows, as on the layup tools of the study"),
+      preset("As built", "default", {}, "The faces of the CAD file, or the planes, cylinders and spheres found in the mesh"));
+  }
+
+  form() {
+    const field = (entry) => h("label", {}, h("span", { dataset: { tip: entry.tip } }, entry.words), h("span.with-unit", {}, h("input.field", { type: "number", min: "0", max: "100", step: "any", name: entry.key, placeholder: String(entry.usual) }), entry.unit));
+    const box = (entry) => h("label.check", { dataset: { tip: entry.tip } }, h("input", { type: "checkbox", name: entry.key }), entry.words);
+    return h("form.more-form#cut-more", { novalidate: true, hidden: true, onsubmit: (event) => {
+      event.preventDefault();
+      this.cutAgain(event.currentTarget);
+    } }, FIELDS.map(field), SWITCHES.map(box), h("button.btn.small", { type: "submit", dataset: { tip: "Recorded orders keep the cut they were recorded on" } }, "Cut again"));
+  }
+
+  cutAgain(form) {
+    const params = {};
+    for (const { key, words, share } of FIELDS) {
+      const { value } = form.elements[key];
+      if (value === "") continue;
+      if (!(Number(value) > 0 && Number(value) < 100)) {
+        this.fault.textContent = `${words}: more than 0 and less than 100 %, or empty for the usual value.`;
+        form.elements[key].setAttribute("aria-invalid", "true");
+        return;
+      }
+      form.elements[key].removeAttribute("aria-invalid");
+      params[key] = Number(value) / share;
+    }
+    for (const { key } of SWITCHES) if (form.elements[key].checked) params[key] = true;
+    this.order(params);
+  }
+
+  async order(params) {
+    this.fault.textContent = "";
+    try {
+      this.onTool(await post(this.address, params));
+    } catch (error) {
+      this.fault.textContent = error.message;
+    }
+  }
+
+  get address() {
+    return `/tools/${encodeURIComponent(this.tool.id)}/segmentations`;
+  }
+
+  slide() {
+    this.wanted = Number(this.slider.value);
+    this.told(this.wanted);
+    if (!this.sending) this.send();
+  }
+
+  // Only the latest wish is sent; the answer may be the nearest number the surface allows.
+  async send() {
+    this.sending = true;
+    this.fault.textContent = "";
+    let tool = null;
+    try {
+      while (this.wanted !== null) {
+        const target = this.wanted;
+        this.wanted = null;
+        tool = await this.cutInto(target);
+      }
+    } catch (error) {
+      this.wanted = null;
+      this.fault.textContent = error.message;
+    }
+    this.sending = false;
+    if (tool) this.onTool(tool);
+    else this.say(this.tool.region_count);
+  }
+
+  async cutInto(target) {
+    try {
+      return await post(this.address, { target, now: true });
+    } catch (error) {
+      if (error.status !== NO_TREE || this.wanted !== null) throw error;
+      return post(this.address, { target });
+    }
+  }
+}

@@ -1,0 +1,167 @@
+// The table of regions beside the 3D view: sortable, hover and selection both ways, names changed in place, all numbers with units.
+
+import { patch } from "../api.js";
+import { fill, h } from "../dom.js";
+import { icon } from "../icons.js";
+import { tint } from "../ramp.js";
+import { renameable } from "../rename.js";
+import { fixed, number, plural } from "../words.js";
+import { regionNames } from "./tools-modes.js";
+
+const by = (read) => (a, b) => read(a) - read(b);
+const COLUMNS = [
+  { key: "name", words: "Region", order: (a, b) => a.name.localeCompare(b.name, "en", { numeric: true }) },
+  { key: "description", words: "Where", order: (a, b) => a.description.localeCompare(b.description) },
+  { key: "area", words: "cm\u00b2", tip: "Surface area in square centimetres", order: by((region) => region.area_mm2), text: (region) => fixed(region.area_mm2 / 100) },
+  { key: "height", words: "Height", tip: "Highest point: 0 is the lowest of the working surface, 1 the highest", order: by((region) => region.height), text: (region) => fixed(region.height, 2) },
+  { key: "curvature", words: "1/m", tip: "Strongest curvature, one over the radius in metres; positive is convex", order: by((region) => region.curvature_per_m), text: (region) => fixed(region.curvature_per_m) },
+  { key: "border", words: "Border", wide: true, tip: "Length of its border in centimetres", order: by((region) => region.perimeter_mm ?? 0), text: (region) => fixed((region.perimeter_mm ?? NaN) / 10) },
+  { key: "free", words: "Free", wide: true, tip: "Part of its border that touches no other region, in centimetres", order: by((region) => region.free_border_mm ?? 0), text: (region) => fixed((region.free_border_mm ?? NaN) / 10) },
+];
+
+// The whole text on hover, but only where the column cuts it.
+function tipWhenCut({ currentTarget: cell }) {
+  if (cell.scrollWidth > cell.clientWidth) cell.dataset.tip = cell.textContent;
+  else delete cell.dataset.tip;
+}
+
+export class RegionTable {
+  constructor(editor, { onRenamed }) {
+    this.editor = editor;
+    this.onRenamed = onRenamed;
+    this.sort = { key: "name", falling: false };
+    this.head = h("tr");
+    this.body = h("tbody", { onkeydown: (event) => this.key(event) });
+    this.table = h("table.region-table", { role: "grid", "aria-multiselectable": "true", "aria-label": "Regions", onpointerleave: () => editor.hover(null) }, h("thead", {}, this.head), this.body);
+    this.scroll = h("div.scroll.table-wrap", {}, this.table);
+    this.facts = h("div.region-facts");
+    this.node = h("div.fill", { style: { flex: "1" } }, this.scroll, this.facts);
+    this.shown = "";
+    this.rows = new Map();
+    this.focused = 0;
+  }
+
+  draw() {
+    const { tool, regions } = this.editor;
+    const key = JSON.stringify([tool.id, tool.segmentation_id, regions, this.sort, document.documentElement.dataset.theme]);
+    if (key !== this.shown && !this.body.querySelector("input")) {
+      this.shown = key;
+      this.drawHead();
+      this.drawRows();
+    }
+    this.mark();
+    this.drawFacts();
+  }
+
+  drawHead() {
+    const { sort } = this;
+    fill(this.head, COLUMNS.map((column) => {
+      const chosen = column.key === sort.key;
+      return h(`th${column.text ? ".num" : ""}${column.wide ? ".wide-only" : ""}`, { scope: "col", "aria-sort": chosen ? (sort.falling ? "descending" : "ascending") : "none" },
+        h("button.sorter", { type: "button", dataset: { key: `sort-${column.key}`, tip: column.tip ?? "" }, onclick: () => this.sortBy(column.key) }, column.words, chosen ? icon(sort.falling ? "sort" : "rising") : null));
+    }));
+  }
+
+  sortBy(key) {
+    this.sort = { key, falling: this.sort.key === key ? !this.sort.falling : !["name", "description"].includes(key) };
+    this.draw();
+  }
+
+  get ordered() {
+    const { order } = COLUMNS.find((column) => column.key === this.sort.key);
+    const list = [...this.editor.regions].sort(order);
+    return this.sort.falling ? list.reverse() : list;
+  }
+
+  drawRows() {
+    this.rows.clear();
+    if (this.focused >= this.editor.regions.length) this.focused = 0;
+    fill(this.body, this.ordered.map((region) => {
+      const row = this.row(region);
+      this.rows.set(region.id, row);
+      return row;
+    }));
+  }
+
+  row(region) {
+    const { editor } = this;
+    const name = renameable(region.name, "region", (wanted) => this.rename(region, wanted));
+    return h("tr", { tabindex: region.id === this.focused ? "0" : "-1", dataset: { region: region.id, key: `region-${region.id}` }, onpointerenter: () => editor.hover(region.id), onfocus: () => this.focus(region.id), onclick: (event) => this.click(region.id, event) },
+      h("td.nowrap", {}, h("span.swatch.pastel", { style: { "--swatch": tint(region.id) } }), name, this.flag(region, "locked", "lock", "Unlock"), this.flag(region, "hidden", "hide", "Show")),
+      h("td.words", { onpointerenter: tipWhenCut }, region.description), COLUMNS.filter((column) => column.text).map((column) => h(`td.num${column.wide ? ".wide-only" : ""}`, {}, column.text(region))));
+  }
+
+  // A small lock or eye in the row takes the state back.
+  flag(region, state, mark, words) {
+    if (!region[state]) return null;
+    return h("button.row-flag", { type: "button", "aria-label": `${words} ${region.name}`, dataset: { tip: `${state === "locked" ? "Locked" : "Hidden"}. ${words} it` }, onclick: (event) => {
+      event.stopPropagation();
+      this.editor.edit({ kind: state === "locked" ? "lock" : "hide", regions: [region.id], on: false }, `${words} ${region.name}`);
+    } }, icon(mark));
+  }
+
+  async rename(region, wanted) {
+    await patch(`/tools/${encodeURIComponent(this.editor.tool.id)}/regions/${region.id}`, { name: wanted });
+    region.name = wanted;
+    this.onRenamed();
+  }
+
+  // Opens the name of a region as a field.
+  edit(id) {
+    this.rows.get(id)?.querySelector(".rename-open")?.click();
+  }
+
+  click(id, event) {
+    if (event.shiftKey || event.ctrlKey || event.metaKey) this.editor.toggle(id);
+    else this.editor.select([id]);
+  }
+
+  focus(id) {
+    this.focused = id;
+    for (const [other, row] of this.rows) row.tabIndex = other === id ? 0 : -1;
+    this.editor.hover(id);
+  }
+
+  key(event) {
+    const row = event.target.closest("tr");
+    if (event.target !== row) return;
+    const id = Number(row.dataset.region);
+    const step = { ArrowDown: "nextElementSibling", ArrowUp: "previousElementSibling" }[event.key];
+    if (step) {
+      const next = row[step];
+      next?.focus();
+      if (next && event.shiftKey && !this.editor.selection.includes(Number(next.dataset.region))) this.editor.toggle(Number(next.dataset.region));
+    } else if (event.key === " ") this.editor.toggle(id);
+    else if (event.key === "Enter" && this.editor.mode === "select") this.editor.select([id]);
+    else return;
+    event.preventDefault();
+  }
+
+  mark() {
+    const { selection, hovered } = this.editor;
+    for (const [id, row] of this.rows) {
+      row.setAttribute("aria-selected", String(selection.includes(id)));
+      row.toggleAttribute("data-hover", id === hovered);
+    }
+    const only = selection.length === 1 ? this.rows.get(selection[0]) : hovered === null ? null : this.rows.get(hovered);
+    if (only && !only.matches(":hover")) only.scrollIntoView({ block: "nearest" });
+  }
+
+  drawFacts() {
+    const { selection, regions } = this.editor;
+    const one = selection.length === 1 ? regions[selection[0]] : null;
+    const chosen = selection.length ? selection.map((id) => regions[id]) : regions;
+    const area = `${number(chosen.reduce((sum, region) => sum + region.area_mm2, 0) / 100)} cm\u00b2`;
+    const hidden = regions.filter((region) => region.hidden).map((region) => region.id);
+    fill(this.facts, one ? this.factsOf(one) : h("p", {}, selection.length ? `${regionNames(this.editor, selection)}: ` : `${plural(regions.length, "region")}, `, h("b", {}, area), selection.length ? "" : " of working surface"),
+      hidden.length ? h("button.btn.quiet.small", { type: "button", dataset: { key: "show-all" }, onclick: () => this.editor.edit({ kind: "hide", regions: hidden, on: false }, "Show all") }, icon("eye"), `Show ${plural(hidden.length, "hidden region")}`) : null);
+  }
+
+  factsOf(region) {
+    const tilt = (Math.acos(Math.max(-1, Math.min(1, region.normal[2]))) * 180) / Math.PI;
+    const radius = Math.abs(region.curvature_per_m) > 1e-3 ? `, radius ${number(1000 / Math.abs(region.curvature_per_m))} mm` : "";
+    const border = region.perimeter_mm === undefined ? "" : `, border ${number(region.perimeter_mm / 10)} cm of which ${number(region.free_border_mm / 10)} cm free`;
+    const touches = region.neighbours.length ? `touches ${regionNames(this.editor, region.neighbours)}` : "touches no other region";
+    return [h("p", {}, h("b", {}, region.name), ` ${region.kind}${radius}, tilted ${number(tilt, 2)}\u00b0${border}`), h("p", {}, `Middle at ${region.centroid_mm.map((x) => number(x)).join(", ")} mm, ${touches}`)];
+  }
+}
