@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from app.errors import UnknownFeature
 from app.geometry.tool import Array, RegionGraph
 from app.sequencing.kernels import box_gaps
+from app.sequencing.layout import COLUMNS as LAYOUT_COLUMNS
+from app.sequencing.layout import layout_values
 
 Sets = NDArray[np.bool_]  # (M, N) one set of finished regions per row
 
@@ -66,7 +68,9 @@ _UP_DOWN = (Feature("height_up", "Step up in height", "phi_10"), Feature("height
 
 def _set(name: str, columns: tuple[Feature, ...]) -> FeatureSet:
     factors: dict[str, tuple[int, ...]] = {c.key: (i,) for i, c in enumerate(columns)}
-    factors.setdefault("height", tuple(i for i, c in enumerate(columns) if c.key.startswith("height")))
+    tall = tuple(i for i, c in enumerate(columns) if c.key.startswith("height"))
+    if tall:
+        factors.setdefault("height", tall)
     return FeatureSet(name, 1, columns, factors)
 
 
@@ -74,6 +78,7 @@ FEATURE_SETS: dict[str, FeatureSet] = {
     "clean": _set("clean", _NINE + _UP_DOWN),
     "authors-real": _set("authors-real", _NINE + _HEIGHT),
     "authors-synthetic": _set("authors-synthetic", _NINE + _HEIGHT),
+    "layout": _set("layout", tuple(Feature(*column) for column in LAYOUT_COLUMNS)),
 }
 _BY_SOURCE = {"mesh": "clean", "real": "authors-real", "synthetic": "authors-synthetic"}
 
@@ -245,4 +250,5 @@ _DEFINITIONS: dict[str, Callable[[RegionGraph, Sets], Array]] = {
     "clean": _clean,
     "authors-real": _authors_real,
     "authors-synthetic": _authors_synthetic,
+    "layout": layout_values,
 }

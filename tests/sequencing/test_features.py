@@ -136,7 +136,7 @@ def test_interactions_multiply_factors():
 
 def test_names():
     clean, real = FEATURE_SETS["clean"], FEATURE_SETS["authors-real"]
-    assert [len(s.columns) for s in FEATURE_SETS.values()] == [11, 10, 10]
+    assert [len(s.columns) for s in FEATURE_SETS.values()] == [11, 10, 10, 10]
     assert [interaction_label(i, clean) for i in DEFAULT_INTERACTIONS] == ["height and curvature", "orientation and curvature"]
     assert interaction_label(Interaction("height", "gaps_left"), real) == "height and gaps left behind"
     problem = SequencingProblem(grid_graph(2, 2, 0), clean)
