@@ -11,8 +11,10 @@ from fastapi import APIRouter, File, Form, Response, UploadFile
 from pydantic import Field
 
 from app import errors
-from app.api.dependencies import Body, Ctx, Json, Name, Paging, RegionId, Row, Version, located, page, tagged
+from app.api.dependencies import Body, Ctx, Json, Name, Paging, Row, Version, located, page, tagged
 from app.api.idempotency import ActionRoute, IdempotencyKey
+from app.geometry.own_table import TEMPLATE_CSV, template_json
+from app.geometry.table_text import decode_table
 from app.workflow import tools as workflow
 from app.workflow.context import Context
 
@@ -31,19 +33,6 @@ class ToolChanges(Body):
     units: Units | None = None
     up: Up | None = None
     body: BodyId | None = None
-
-
-class SegmentationOrder(Body):
-    """How finely to cut."""
-
-    target: Annotated[int, Field(ge=1, le=200, description="Regions wanted; left out: decided by the tolerance.")] | None = None
-    tolerance: Annotated[float, Field(gt=0, lt=1, description="Fit error allowed, relative to the part's size.")] | None = None
-
-
-class RegionName(Body):
-    """The name people use for a region."""
-
-    name: Annotated[str, Field(min_length=1, max_length=40)]
 
 
 class JobState(Row):
@@ -78,6 +67,20 @@ class FileBody(Row):
     up_guess: str
 
 
+class EditState(Row):
+    """Whether the regions can be edited, what undo and redo would do, what is locked or hidden."""
+
+    can_undo: bool
+    can_redo: bool
+    undo: str | None
+    redo: str | None
+    locked: list[int]
+    hidden: list[int]
+    editable: bool
+    why_not: str | None
+    step: int
+
+
 class Tool(Row):
     """A part and where its import stands."""
 
@@ -98,6 +101,7 @@ class Tool(Row):
     demonstration_id: str | None
     feature_set: str | None
     segmentation_id: str | None
+    edit: EditState
     job: JobState | None
     report: list[ReportLine]
     error: Failure | None
@@ -110,28 +114,6 @@ class ToolPage(Row):
 
     items: list[Tool]
     next: str | None
-
-
-class Region(Row):
-    """One patch of the tool's working surface."""
-
-    id: int
-    name: str
-    description: str
-    area_mm2: float
-    curvature_per_m: float
-    kind: str
-    centroid_mm: list[float]
-    normal: list[float]
-    height: float
-    neighbours: list[int]
-
-
-class RegionList(Row):
-    """All regions of a tool; the position is the region id."""
-
-    items: list[Region]
-    next: None = None
 
 
 @contextmanager
@@ -177,8 +159,10 @@ def import_region_table(
     ctx: Ctx,
     project_id: str,
     response: Response,
-    file: Annotated[UploadFile, File(description="CSV in the layout of the paper's authors.")],
-    layout: Annotated[Literal["synthetic", "real"] | None, Form(description="Left out: recognised from the header.")] = None,
+    file: Annotated[
+        UploadFile, File(description="CSV or JSON: the product's own layout (see the template), or the CSV layouts of the paper's authors.")
+    ],
+    layout: Annotated[Literal["synthetic", "real", "apprentice"] | None, Form(description="Left out: recognised.")] = None,
     _key: IdempotencyKey = None,
 ) -> Json:
     """Import a region table; the expert's sequence in it becomes a demonstration."""
@@ -191,14 +175,19 @@ def table_text(path: Path, file_name: str) -> str:
     """The table as text.
 
     Raises:
-        InvalidInput: Too long for a table, or not UTF-8 text.
+        InvalidInput: Too long for a table, or not text.
     """
     if path.stat().st_size > MOST_TABLE_BYTES:
-        raise errors.TooLarge(f"{file_name} is larger than {MOST_TABLE_BYTES // 1_000_000} MB; a region table is a short CSV file.")
-    try:
-        return path.read_bytes().decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise errors.MalformedTable(f"{file_name} is not text; a region table is a CSV file in UTF-8.") from error
+        raise errors.TooLarge(f"{file_name} is larger than {MOST_TABLE_BYTES // 1_000_000} MB; a region table is a short CSV or JSON file.")
+    return decode_table(path.read_bytes(), file_name)
+
+
+@router.get("/region-table-template", response_class=Response, responses={200: {"content": {"text/csv": {}, "application/json": {}}}})
+def region_table_template(format: Literal["csv", "json"] = "csv") -> Response:
+    """A small region table to start from: two by two regions with an order."""
+    text, media_type = (TEMPLATE_CSV, "text/csv") if format == "csv" else (template_json(), "application/json")
+    headers = {"Content-Disposition": f'attachment; filename="region-table.{format}"'}
+    return Response(text, media_type=media_type, headers=headers)
 
 
 @router.get("/tools/{tool_id}", response_model=Tool)
@@ -224,24 +213,6 @@ def delete_tool(ctx: Ctx, tool_id: str, version: Version) -> None:
 def restore_tool(ctx: Ctx, tool_id: str, response: Response, _key: IdempotencyKey = None) -> Json:
     """Undo the deletion."""
     return tagged(response, workflow.restore_tool(ctx, tool_id))
-
-
-@router.post("/tools/{tool_id}/segmentations", status_code=202, response_model=Tool)
-def segment_tool(ctx: Ctx, tool_id: str, body: SegmentationOrder, response: Response, _key: IdempotencyKey = None) -> Json:
-    """Cut the tool again; demonstrations keep the segmentation they were clicked on."""
-    return located(response, "tools", workflow.segment_tool(ctx, tool_id, body.model_dump(exclude_none=True)))
-
-
-@router.get("/tools/{tool_id}/regions")
-def list_regions(ctx: Ctx, tool_id: str) -> RegionList:
-    """The regions with what the features see of them."""
-    return RegionList(items=[Region.model_validate(row) for row in workflow.list_regions(ctx, tool_id)])
-
-
-@router.patch("/tools/{tool_id}/regions/{region}", response_model=Region)
-def rename_region(ctx: Ctx, tool_id: str, region: RegionId, body: RegionName) -> Json:
-    """Give a region another name."""
-    return workflow.rename_region(ctx, tool_id, region, body.name)
 
 
 @router.get("/tools/{tool_id}/mesh.glb", response_class=Response, responses={200: {"content": {"model/gltf-binary": {}}}})

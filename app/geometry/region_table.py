@@ -1,20 +1,26 @@
-"""The authors' region tables: a tool typed in as one line per region, with the expert's sequence in the first line.
+"""Region tables: a tool typed in as one line per region, with the expert's sequence in the first line.
 
-Two layouts exist, for the paper's synthetic and for its scanned tools. Numbers are read as the authors' code reads them,
-quirks included, so that the published feature values come out; what does not fit together is named, and what can't be
-read is refused.
+The paper's authors have two layouts, for their synthetic and for their scanned tools. Numbers are read as the authors'
+code reads them, quirks included, so that the published feature values come out; what does not fit together is named, what
+can be put right is put right and said, and what can't be read is refused. The product's own layout is read in own_table.
 """
 
 import math
+import re
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.geometry.region_rows import Layout, Row, read_rows
-from app.geometry.schematic import patches, rows_of_patches
+from app.errors import MalformedTable
+from app.geometry.cleaning import Level
+from app.geometry.own_table import is_own_table, read_own_table
+from app.geometry.region_rows import AuthorsLayout, Layout, Row, read_rows, words_of_delimiter
+from app.geometry.schematic import drawn, rows_of_patches
 from app.geometry.table_faults import faults_between, faults_of_sizes
-from app.geometry.tool import Array, Mesh, Region, RegionGraph, Tool, region_letters
+from app.geometry.table_repair import Sides, four_sides, places_by_neighbours
+from app.geometry.table_text import entries, number, outline_points
+from app.geometry.tool import Array, RegionGraph, Tool
 
 OUTSIDE = "O"  # the tool's outer edge in a list of neighbours
 
@@ -25,8 +31,13 @@ class RegionTable:
 
     tool: Tool  # with a drawn stand-in for the mesh
     expert: tuple[int, ...] | None  # the sequence in the table
-    faults: tuple[str, ...]  # one sentence per inconsistency, with row and value
+    lines: tuple[tuple[Level, str], ...]  # one sentence per repair ("repaired") and inconsistency ("warning")
     layout: Layout
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """Everything that was put right or does not fit together, with row and value."""
+        return tuple(sentence for level, sentence in self.lines if level != "info")
 
 
 @dataclass(frozen=True)
@@ -52,8 +63,9 @@ def read_region_table(text: str, layout: Layout | None = None, file_name: str = 
     """Read a region table.
 
     Args:
-        text: The file's content (CSV; byte order mark, blank lines and any line ends are fine).
-        layout: "synthetic" or "real"; None recognises it from the header.
+        text: The file's content (CSV, or JSON in the product's own layout; byte order mark, blank lines, any line ends and
+            delimiters are fine).
+        layout: "synthetic", "real" or "apprentice"; None recognises it.
         file_name: For messages.
 
     Raises:
@@ -61,72 +73,110 @@ def read_region_table(text: str, layout: Layout | None = None, file_name: str = 
 
     Paper: surplus lengths (real tool 4, row a: "0,35" for 0.35) stay as the authors' code reads them and are named.
     """
+    if layout == "apprentice" or (layout is None and is_own_table(text)):
+        own = read_own_table(text, file_name)
+        return RegionTable(own.tool, own.expert, own.lines, "apprentice")
+    return _read_authors(text, layout, file_name)
+
+
+def _read_authors(text: str, layout: AuthorsLayout | None, file_name: str) -> RegionTable:
+    if "\0" in text:
+        raise MalformedTable(f"{file_name} is not text. Expected a table with commas (CSV).")
     layout, rows, odd = read_rows(text, layout, file_name)
     ids = {row.letter: a for a, row in enumerate(rows)}
-    borders = [_border(row, ids, layout, odd) for row in rows]
+    groups = [_groups(row, ids) for row in rows]
+    sides = [_sides(row, a, groups, list(ids)) for a, row in enumerate(rows)]
+    borders = [_border(row, mine, ids, layout) for row, mine in zip(rows, sides, strict=True)]
     graph = _synthetic_graph(rows, borders) if layout == "synthetic" else _real_graph(rows, borders)
-    expert = _expert(rows, ids, odd)
-    tool = _drawn(graph)
+    unsure: list[str] = []
+    expert = _expert(rows, ids, unsure)
+    low, high = (graph.low, graph.high) if layout == "synthetic" else rows_of_patches(graph.low, graph.area)
+    bends = (-0.05, 0.05) if layout == "synthetic" else (0.0, 5.0)  # real tables: a score from -5 to 10
     letters = [row.letter for row in rows]
-    faults = odd + faults_between(letters, borders, graph) + faults_of_sizes(letters, rows, graph)
-    return RegionTable(tool, expert, tuple(faults), layout)
+    tool = drawn(graph, [name.upper() for name in letters], low, high, bends)
+    unsure += faults_between(letters, borders, graph) + faults_of_sizes(letters, rows, graph)
+    delimiter = words_of_delimiter(text)
+    lines: list[tuple[Level, str]] = [("info", delimiter)] if delimiter else []
+    lines.extend(("repaired", sentence) for sentence in odd)
+    lines.extend(("warning", sentence) for sentence in unsure)
+    return RegionTable(tool, expert, tuple(lines), layout)
 
 
-def _border(row: Row, ids: dict[str, int], layout: Layout, odd: list[str]) -> Border:
-    sides = _sides(row, ids, odd)
+def _border(row: Row, sides: Sides, ids: dict[str, int], layout: Layout) -> Border:
     count = sum(len(side) for side in sides)
     lengths = row.numbers("lengths")
-    if len(lengths) < count or sum(lengths) <= 0:
+    if len(lengths) < count or sum(lengths) <= 0 or min(lengths) < 0:
         place = row.headers["neighbours"]
         row.refuse("lengths", f"holds {len(lengths)} lengths for {count} entries in '{place}'. Write one length above 0 per entry.")
     if len(lengths) > count:
-        odd.append(
-            f"Row {row.letter}: {row.cells['lengths']!r} in '{row.headers['lengths']}' holds {len(lengths)} lengths for {count} neighbours,"
-            f" probably a comma in place of a point; read as the authors' code does, the first {count} are taken in order."
+        row.note(
+            "lengths",
+            f"holds {len(lengths)} lengths for {count} neighbours,"
+            f" probably a comma in place of a point; read as the authors' code does, the first {count} are taken in order.",
         )
-    angles = _angles(row, sides, odd) if layout == "real" else ()
-    corners = [_region(row, "corners", t, ids) for t in row.items("corners") if t]
-    return Border(sides, tuple(lengths), angles, tuple(b for b in corners if b >= 0))
+    angles = _angles(row, sides) if layout == "real" else ()
+    corners = [_region(row, "corners", t, ids) for t in row.items("corners") if t] if "corners" in row.cells else []
+    return Border(sides, tuple(lengths), angles, tuple(b for b in corners if b is not None and b >= 0))
 
 
-def _sides(row: Row, ids: dict[str, int], odd: list[str]) -> tuple[tuple[int, ...], ...]:
-    """'O,x,b,c,x,d,x,O' -> four sides."""
-    sides: list[list[int]] = [[]]
+def _groups(row: Row, ids: dict[str, int]) -> list[list[int]]:
+    """'O,x,b,c,x,d,x,O' -> the entries between the separators, empty groups left out."""
+    groups: list[list[int]] = [[]]
     for token in row.items("neighbours"):
         if token.lower() == "x":
-            sides.append([])
+            groups.append([])
         elif not token:
-            odd.append(f"Row {row.letter}: {row.cells['neighbours']!r} in '{row.headers['neighbours']}' has a stray comma; it is left out.")
+            row.note("neighbours", "has a stray comma; it is left out.")
         else:
-            sides[-1].append(_region(row, "neighbours", token, ids))
-    if len(sides) != 4 or not all(sides):
-        filled = sum(bool(side) for side in sides)
+            region = _region(row, "neighbours", token, ids)
+            groups[-1] += [] if region is None else [region]
+    return [group for group in groups if group]
+
+
+def _sides(row: Row, a: int, groups: list[list[list[int]]], letters: list[str]) -> Sides:
+    """The four sides; where separators are missing or too many, as the neighbours' rows have it."""
+    mine = groups[a]
+    if len(mine) == 4:
+        return tuple(tuple(group) for group in mine)
+    sides = four_sides(a, mine, groups)
+    if sides is None:
         how = "Separate the four sides by x and write O for the tool's edge: O,x,b,c,x,d,x,O."
-        row.refuse("neighbours", f"lists {filled} sides instead of 4. {how}")
-    return tuple(tuple(side) for side in sides)
+        row.refuse("neighbours", f"lists {len(mine)} sides instead of 4, and the neighbours' rows don't tell which. {how}")
+    read = ",x,".join(",".join(OUTSIDE if b < 0 else letters[b] for b in side) for side in sides)
+    row.note("neighbours", f"lists {len(mine)} sides instead of 4; read as {read!r}, which agrees with the neighbours' rows.")
+    return sides
 
 
-def _region(row: Row, key: str, token: str, ids: dict[str, int]) -> int:
-    """Region number of a letter, -1 for the tool's outer edge."""
+def _region(row: Row, key: str, token: str, ids: dict[str, int]) -> int | None:
+    """Region number of a letter, -1 for the tool's outer edge, None for a stray number."""
     if token == OUTSIDE:
         return -1
-    if token.lower() not in ids:
-        row.refuse(key, f"names the region {token!r}, which has no row. Choose from: {', '.join(ids)}, or O for the tool's edge.")
-    return ids[token.lower()]
+    name = token.strip(".:!?").lower()
+    if name in ids:
+        return ids[name]
+    if name in ("o", "0"):
+        row.note(key, f"has {token!r}; read as {OUTSIDE}, the tool's edge.")
+        return -1
+    if number(token) is not None:
+        row.note(key, f"has the stray number {token!r}; it is left out.")
+        return None
+    row.refuse(key, f"names the region {token!r}, which has no row. Choose from: {', '.join(ids)}, or O for the tool's edge.")
 
 
-def _angles(row: Row, sides: tuple[tuple[int, ...], ...], odd: list[str]) -> tuple[float, ...]:
+def _angles(row: Row, sides: Sides) -> tuple[float, ...]:
     """Neighbour angles in rad, at the same places as the neighbours; the entry at an outer edge may be anything."""
-    listed, entries = [b for side in sides for b in side], row.items("angles")
-    if len(entries) < len(listed):
+    listed, given = [b for side in sides for b in side], row.items("angles")
+    inner = [b for b in listed if b >= 0]
+    if len(given) == len(inner) < len(listed) and all(number(e) is not None for e in given):
+        row.note("angles", f"holds {len(given)} angles for {len(listed)} entries; read as those of the {len(inner)} neighbours in turn.")
+        left = iter(given)
+        given = [next(left) if b >= 0 else "x" for b in listed]
+    if len(given) < len(listed):
         how = "Write one angle in degrees per neighbour, x at the tool's edge."
-        row.refuse("angles", f"holds {len(entries)} angles for {len(listed)} neighbours. {how}")
-    if len(entries) > len(listed):
-        odd.append(
-            f"Row {row.letter}: {row.cells['angles']!r} in '{row.headers['angles']}' holds {len(entries)} angles"
-            f" for {len(listed)} neighbours; the last ones are left out."
-        )
-    return tuple(math.radians(row.number_in("angles", e)) if b >= 0 else 0.0 for b, e in zip(listed, entries, strict=False))
+        row.refuse("angles", f"holds {len(given)} angles for {len(listed)} neighbours. {how}")
+    if len(given) > len(listed):
+        row.note("angles", f"holds {len(given)} angles for {len(listed)} neighbours; the last ones are left out.")
+    return tuple(math.radians(row.number_in("angles", e)) if b >= 0 else 0.0 for b, e in zip(listed, given, strict=False))
 
 
 @dataclass(frozen=True)
@@ -160,11 +210,11 @@ def _matrices(borders: list[Border]) -> _Matrices:
 
 def _synthetic_graph(rows: list[Row], borders: list[Border]) -> RegionGraph:
     m, n = _matrices(borders), len(rows)
-    size, turn = np.array([_size(row) for row in rows]), np.radians([row.number_in("turn") for row in rows])
+    points = [_outline(row) for row in rows]
+    size, turn = np.array([_size(row, p) for row, p in zip(rows, points, strict=True)]), np.radians([row.number_in("turn") for row in rows])
     difference = np.abs(turn[:, None] - turn[None, :])
     entries = np.array([[border.listed.count(b) for b in range(n)] for border in borders], float)
     angle = np.where(difference > 0, entries / np.where(difference > 0, difference, 1.0), 0.0)
-    points = [_outline(row) for row in rows]
     half = size.sum(axis=1)[:, None]
     return RegionGraph(
         source="synthetic",
@@ -175,16 +225,19 @@ def _synthetic_graph(rows: list[Row], borders: list[Border]) -> RegionGraph:
     )  # fmt: skip
 
 
-def _size(row: Row) -> tuple[float, float]:
+def _size(row: Row, outline: Array) -> tuple[float, float]:
+    if "size" not in row.cells:
+        width, depth = np.ptp(outline, axis=0)
+        return float(width), float(depth)
     width, depth = row.pair("size")
     if min(width, depth) <= 0:
-        row.refuse("size", "is not a width and a depth above 0. Write two lengths, such as 1.5,8.")
+        row.refuse("size", "is not a size. Write width and depth, both above 0, such as 1.5,8.")
     return width, depth
 
 
 def _outline(row: Row) -> Array:
     """'0,0,x,1.5,0,x,1.5,8,x,0,8' -> (4, 2) corner points."""
-    points = [p.strip(" ,").split(",") for p in row.cells["outline"].lower().split("x")]
+    points = outline_points(row.cells["outline"])
     if len(points) < 3 or any(len(p) != 2 for p in points):
         how = "Write x and y of each corner, with x between corners: 0,0,x,1.5,0,x,1.5,8,x,0,8."
         row.refuse("outline", f"is not a list of corner points. {how}")
@@ -209,7 +262,7 @@ def _real_graph(rows: list[Row], borders: list[Border]) -> RegionGraph:
             row.refuse("area", "is not a share of the tool's area above 0, such as 0.08.")
         if z == 0:
             row.refuse("height", "can't be used: the height feature divides by it. Write the highest point above 0, such as 0.85.")
-    index = np.array([row.pair("index") for row in rows])
+    index = np.array([row.pair("index") for row in rows]) if "index" in rows[0].cells else places_by_neighbours([b.sides for b in borders])
     return RegionGraph(
         source="real",
         shared=m.shared / perimeter, opposite=m.opposite / perimeter, angle=angle,
@@ -222,49 +275,20 @@ def _column(rows: list[Row], key: str) -> Array:
     return np.array([row.number_in(key) for row in rows])
 
 
-def _expert(rows: list[Row], ids: dict[str, int], odd: list[str]) -> tuple[int, ...] | None:
-    """The expert's sequence, from the first row that has one."""
+def _expert(rows: list[Row], ids: dict[str, int], unsure: list[str]) -> tuple[int, ...] | None:
+    """The expert's sequence, from the first row that has one; None if it is unusable, which is said."""
     given = [row for row in rows if row.cells.get("sequence")]
     if not given:
         return None
     row = given[0]
-    odd.extend(f"Row {other.letter}: a second sequence {other.cells['sequence']!r} is left out." for other in given[1:])
-    order = [_region(row, "sequence", token, ids) for token in row.items("sequence")]
-    wrong = [letter for letter, a in ids.items() if order.count(a) != 1]
-    if wrong or len(order) != len(ids):
-        how = f"Write all of {','.join(ids)} in the expert's order."
-        row.refuse("sequence", f"does not hold every region once: see {', '.join(wrong) or 'O'}. {how}")
-    return tuple(order)
-
-
-def _drawn(graph: RegionGraph) -> Tool:
-    """The tool with patches in place of its mesh."""
-    low, high = (graph.low, graph.high) if graph.source == "synthetic" else rows_of_patches(graph.low, graph.area)
-    mesh, labels = patches(low, high, graph.height)
-    middle = (low + high) / 2
-    place = (middle - low.min(axis=0)) / (high.max(axis=0) - low.min(axis=0))
-    names = region_letters(graph.n)
-    regions = tuple(_drawn_region(names[a], _describe(graph, a, place[a]), mesh, labels == a, graph.curvature[a]) for a in range(graph.n))
-    return Tool(mesh, labels, regions, graph)
-
-
-def _describe(graph: RegionGraph, a: int, place: Array) -> str:
-    """'Back left, curved inwards'."""
-    along = ("Back", "Middle", "Front")[min(2, int(place[1] * 3))]
-    across = ("left", "", "right")[min(2, int(place[0] * 3))]
-    inwards, outwards = (0.0, 5.0) if graph.source == "real" else (-0.05, 0.05)  # real tables: a score from -5 to 10
-    k = graph.curvature[a]
-    bend = "curved inwards" if k < inwards else "curved outwards" if k > outwards else "flat"
-    return f"{along} {across}".strip() + f", {bend}"
-
-
-def _drawn_region(name: str, description: str, mesh: Mesh, mine: NDArray[np.bool_], curvature: float) -> Region:
-    """Centre, normal and area as drawn; a region hidden under others gets the middle of the tool and no area."""
-    corners = mesh.vertices[mesh.faces[mine]]
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
-    size = np.linalg.norm(across, axis=1)
-    area = float(size.sum())
-    if area == 0:
-        return Region(name, description, mesh.vertices.mean(axis=0), np.array([0.0, 0.0, 1.0]), 0.0, float(curvature), "listed")
-    normal = across.sum(axis=0) / np.linalg.norm(across.sum(axis=0))
-    return Region(name, description, (corners.mean(axis=1) * size[:, None]).sum(axis=0) / area, normal, area, float(curvature), "listed")
+    unsure.extend(f"Row {other.letter}: a second sequence {other.cells['sequence']!r} is left out." for other in given[1:])
+    names = entries(re.sub(r"\s*(->|>|\u2192|-)\s*", ",", row.cells["sequence"]).lower())
+    unknown = [name for name in names if name not in ids]
+    wrong = unknown or [name for name in ids if names.count(name) != 1]
+    if wrong:
+        unsure.append(
+            f"Row {row.letter}: {row.cells['sequence']!r} in '{row.headers['sequence']}' does not hold every region once (see "
+            f"{', '.join(repr(name) if unknown else name for name in wrong)}); it is left out, so the tool has no demonstration."
+        )
+        return None
+    return tuple(ids[name] for name in names)

@@ -1,12 +1,13 @@
 """A drawn stand-in for a tool that is known only from a region table: patches on a rectangle, lifted to their heights."""
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.geometry.moulds import solid
-from app.geometry.tool import Array, Mesh
+from app.geometry.tool import Array, Mesh, Region, RegionGraph, Tool
 
 SIZE = 0.5  # m, longest side in plan view
 RELIEF = 0.035  # m between the lowest and the highest patch
@@ -80,3 +81,40 @@ def _surface(cells: NDArray[np.int32], lift: Array) -> Array:
 def _mean_of_neighbours(z: Array) -> Array:
     """Mean of each 2 x 2 block, one smaller in both directions."""
     return (z[:-1, :-1] + z[1:, :-1] + z[:-1, 1:] + z[1:, 1:]) / 4
+
+
+def drawn(graph: RegionGraph, names: Sequence[str], low: Array, high: Array, bends: tuple[float, float]) -> Tool:
+    """The tool with patches in place of its mesh.
+
+    Args:
+        graph: What the table says.
+        names: Name of each region.
+        low: Lower corners in plan view, shape (N, 2), any unit; x to the right, y towards the viewer.
+        high: Upper corners, shape (N, 2).
+        bends: Curvatures below the first are called inwards, above the second outwards.
+    """
+    mesh, labels = patches(low, high, graph.height)
+    place = ((low + high) / 2 - low.min(axis=0)) / (high.max(axis=0) - low.min(axis=0))
+    words = [_describe(float(k), p, bends) for k, p in zip(graph.curvature, place, strict=True)]
+    regions = tuple(_region(names[a], words[a], mesh, labels == a, graph.curvature[a]) for a in range(graph.n))
+    return Tool(mesh, labels, regions, graph)
+
+
+def _describe(curvature: float, place: Array, bends: tuple[float, float]) -> str:
+    """'Back left, curved inwards'."""
+    along = ("Back", "Middle", "Front")[min(2, int(place[1] * 3))]
+    across = ("left", "", "right")[min(2, int(place[0] * 3))]
+    bend = "curved inwards" if curvature < bends[0] else "curved outwards" if curvature > bends[1] else "flat"
+    return f"{along} {across}".strip() + f", {bend}"
+
+
+def _region(name: str, description: str, mesh: Mesh, mine: NDArray[np.bool_], curvature: float) -> Region:
+    """Centre, normal and area as drawn; a region hidden under others gets the middle of the tool and no area."""
+    corners = mesh.vertices[mesh.faces[mine]]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
+    size = np.linalg.norm(across, axis=1)
+    area = float(size.sum())
+    if area == 0:
+        return Region(name, description, mesh.vertices.mean(axis=0), np.array([0.0, 0.0, 1.0]), 0.0, float(curvature), "listed")
+    normal = across.sum(axis=0) / np.linalg.norm(across.sum(axis=0))
+    return Region(name, description, (corners.mean(axis=1) * size[:, None]).sum(axis=0) / area, normal, area, float(curvature), "listed")

@@ -6,6 +6,7 @@ from typing import Protocol
 import numpy as np
 
 from app.geometry.region_rows import Row
+from app.geometry.table_text import number, outline_points
 from app.geometry.tool import RegionGraph
 
 EQUAL = 1e-6  # relative: listed lengths and angles closer than this agree
@@ -49,7 +50,7 @@ def _faults_of_pair(name: str, other: str, a: int, b: int, mine: ListedBorder, t
     length, back = mine.length_to(b), theirs.length_to(a)
     if abs(length - back) > EQUAL * max(length, back):
         found.append(f"Rows {name} and {other}: their common border is {length:g} in row {name} and {back:g} in row {other}.")
-    if graph.source == "real":
+    if graph.source != "synthetic":
         angle, turned = np.degrees(graph.angle[a, b]), np.degrees(graph.angle[b, a])
         if abs(angle + turned) > EQUAL * 360:
             found.append(
@@ -68,9 +69,9 @@ def _synthetic_sizes(letters: Sequence[str], rows: Sequence[Row], graph: RegionG
     found, box = [], np.prod(graph.high - graph.low, axis=1)
     for a, name in enumerate(letters):
         if abs(box[a] - graph.area[a]) > EQUAL * box[a]:
-            size = rows[a].cells["size"]
+            size = rows[a].cells.get("size", "")
             found.append(f"Row {name}: the size {size!r} has area {graph.area[a]:g}, its corner points enclose {box[a]:g}.")
-        points = {tuple(map(float, p.strip(" ,").split(","))) for p in rows[a].cells["outline"].lower().split("x")}
+        points = {(number(x), number(y)) for x, y in outline_points(rows[a].cells["outline"])}
         if points != {(x, y) for x in (graph.low[a, 0], graph.high[a, 0]) for y in (graph.low[a, 1], graph.high[a, 1])}:
             found.append(f"Row {name}: the corner points {rows[a].cells['outline']!r} are not those of a rectangle; their box is used.")
         for b in range(a):

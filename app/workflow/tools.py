@@ -19,7 +19,7 @@ from app.storage import emit
 from app.storage.artifacts import keep
 from app.storage.conversions import MEDIA_TYPE, tool_to_bytes
 from app.storage.identity import now
-from app.storage.tables import Demonstration, Project, RegionName, Segmentation, ToolRow
+from app.storage.tables import Demonstration, Project, Segmentation, ToolRow
 from app.workflow import import_job
 from app.workflow.context import Context
 from app.workflow.import_questions import bodies_json, check_body, notes, still_open, to_ask
@@ -111,7 +111,7 @@ def answer_tool(ctx: Context, tool_id: str, changes: Json, version: int | None =
         _refuse_while_training(session, row)
         row.units, row.up = frame.get("units", row.units), frame.get("up", row.up)
         row.body = frame.get("body", row.body)
-        row.part_sha, row.error = None, None
+        row.part_sha, row.tree_sha, row.error = None, None, None
         cancel_jobs(session, row.id)
         return _next(session, row, {})
 
@@ -135,13 +135,13 @@ def segment_tool(ctx: Context, tool_id: str, parameters: Json) -> Json:
 
 
 def import_region_table(ctx: Context, project_id: str, text: str, file_name: str, layout: Any = None) -> Json:
-    """Add a tool from the authors' CSV layout; the expert's sequence in it becomes a demonstration."""
+    """Add a tool from a region table; the expert's sequence in it becomes a demonstration."""
     table = read_region_table(text, layout, file_name)
     content = tool_to_bytes(table.tool)
 
     def change(session: Session) -> Json:
         present(session, Project, project_id)
-        report = [{"level": "repaired", "text": fault} for fault in table.faults]
+        report = [{"level": level, "text": text} for level, text in table.lines]
         row = ToolRow(
             project_id=project_id, name=checked_name(Path(file_name).stem), kind="table", state="ready", file_name=file_name, report=report
         )
@@ -213,36 +213,6 @@ def tool_value(ctx: Context, tool_id: str) -> Tool:
 def segmentation_value(ctx: Context, segmentation_id: str) -> Tool:
     """An earlier or current cut: what a sequence was clicked on."""
     return ctx.store.read(lambda session: ctx.values.tool(session, found(session, Segmentation, segmentation_id, "segmentation")))
-
-
-def list_regions(ctx: Context, tool_id: str) -> list[Json]:
-    """The regions of a tool; the position is the region id."""
-    tool = tool_value(ctx, tool_id)
-    return [region_json(tool, a) for a in range(tool.n)]
-
-
-def rename_region(ctx: Context, tool_id: str, region: int, name: str) -> Json:
-    """Give a region another name.
-
-    Raises:
-        InvalidInput: No such region, an empty name, or one that another region has.
-    """
-    name = name.strip()
-    if not 1 <= len(name) <= 40:
-        raise InvalidInput("A region's name has 1 to 40 characters.")
-
-    def change(session: Session) -> None:
-        row = present(session, ToolRow, tool_id)
-        cut = ready_segmentation(session, row)
-        check_region(row, cut, region)
-        others = [r.name for i, r in enumerate(ctx.values.tool(session, cut).regions) if i != region]
-        if name in others:
-            raise InvalidInput(f"Another region of {row.name} is called {name}; every region has a name of its own.")
-        session.merge(RegionName(segmentation_id=cut.id, region=region, name=name))
-        touch_tool(session, row)
-
-    ctx.store.write(change)
-    return region_json(tool_value(ctx, tool_id), region)
 
 
 def check_region(row: ToolRow, cut: Segmentation, region: int) -> None:

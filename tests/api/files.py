@@ -28,6 +28,7 @@ d,3,"b,x,O,x,O,x,c","10,x,x,-10","0.5,0.5,0.5,0.5",0.7,0.25,0.5,0.6,"a,O,O,O","1
 """
 )
 THREE_SIDES = REAL_TABLE.replace('d,3,"b,x,O,x,O,x,c"', 'd,3,"b,x,O,O,x,c"')  # the fault of the authors' real tool 13
+SIDE_MISSING = REAL_TABLE.replace('d,3,"b,x,O,x,O,x,c"', 'd,3,"b,x,O,x,c"')
 
 
 def binary_stl(triangles: list[list[float]]) -> bytes:

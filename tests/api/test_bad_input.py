@@ -9,7 +9,7 @@ import httpx
 import pytest
 from starlette.testclient import TestClient
 
-from tests.api.files import REAL_TABLE, STEP, THREE_SIDES, binary_stl, multipart, tetrahedron, zip_bomb
+from tests.api.files import REAL_TABLE, SIDE_MISSING, STEP, THREE_SIDES, binary_stl, multipart, tetrahedron, zip_bomb
 from tests.api.problems import check_problem
 from tests.conftest import Api, LiveServer, shared
 
@@ -97,12 +97,35 @@ def stored_bytes(folder: Path) -> int:
 
 
 def test_a_malformed_region_table_names_row_and_value(client: TestClient, project: str) -> None:
-    """One row that lacks a separator and so has three sides."""
-    files = {"file": ("Mold_13_Data.csv", THREE_SIDES.encode())}
+    """One row that lacks a whole side."""
+    files = {"file": ("Mold_13_Data.csv", SIDE_MISSING.encode())}
     detail = check_problem(client.post(f"/api/v1/projects/{project}/tools/region-table", files=files), 422, "MalformedTable")
-    for word in ("Row d", "b,x,O,O,x,c", "3 sides", "4"):
+    for word in ("Row d", "b,x,O,x,c", "3 sides", "4"):
         assert word in detail
     assert client.get(f"/api/v1/projects/{project}/tools").json()["items"] == []
+
+
+def test_a_missing_separator_is_put_in_where_the_neighbours_say_and_told(api: Api, project: str) -> None:
+    tool = api.upload(f"/projects/{project}/tools/region-table", "Mold_13_Data.csv", THREE_SIDES.encode())
+    told = (
+        "Row d: 'b,x,O,O,x,c' in 'neighbors' lists 3 sides instead of 4; read as 'b,x,O,x,O,x,c', which agrees with the neighbours' rows."
+    )
+    assert tool["report"] == [{"level": "repaired", "text": told}]
+    assert api.get(f"/demonstrations/{tool['demonstration_id']}")["sequence"] == [0, 1, 3, 2]
+
+
+def test_the_templates_are_tools(api: Api, client: TestClient, project: str) -> None:
+    """Download, upload again: a tool with a demonstration and nothing to complain about; both formats are the same tool."""
+    regions = []
+    for form in ("csv", "json"):
+        response = client.get(f"/api/v1/region-table-template?format={form}")
+        assert response.status_code == 200
+        assert response.headers["content-disposition"] == f'attachment; filename="region-table.{form}"'
+        tool = api.upload(f"/projects/{project}/tools/region-table", f"template.{form}", response.content)
+        assert (tool["region_count"], tool["demonstrated"], tool["report"], tool["feature_set"]) == (4, True, [], "clean")
+        regions.append(api.get(f"/tools/{tool['id']}/regions")["items"])
+    assert regions[0] == regions[1]
+    check_problem(client.get("/api/v1/region-table-template?format=xlsx"), 422)
 
 
 def test_a_sound_region_table_brings_its_demonstration(api: Api, project: str) -> None:

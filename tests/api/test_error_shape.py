@@ -28,10 +28,11 @@ BODIES: dict[str, dict[str, Any]] = {
     "start_playback": {},
     "create_session": {"project_id": UNKNOWN},
     "show": {"mode": "empty"},
+    "change_editing": {"selection": []},
     "control_playback": {"action": "pause"},
 }
 UPLOADS = {"upload_tool": ("x.stl", tetrahedron()), "import_region_table": ("x.csv", REAL_TABLE.encode())}
-WITHOUT_IDS = {"list_projects", "create_project", "create_sample_project", "healthz", "readyz"}
+WITHOUT_IDS = {"region_table_template", "list_projects", "create_project", "create_sample_project", "healthz", "readyz"}
 
 
 def operations(client: TestClient) -> list[tuple[str, str, dict[str, Any]]]:
