@@ -19,9 +19,9 @@ _MONOMIALS = sorted({tuple(a + b for a, b in zip(p, q, strict=True)) for p in _Q
 PRODUCT = np.array([[_MONOMIALS.index(tuple(a + b for a, b in zip(p, q, strict=True))) for q in _QUADRATIC] for p in _QUADRATIC])
 SQUARE = np.array([[4, 7, 8], [7, 5, 9], [8, 9, 6]])  # position in q of x_a x_b
 NORMAL, NORMAL2, NORMAL_CENTRE, AREA, SIZE = 35, 38, 44, 53, 54
-_NORMAL2_AT = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
+NORMAL2_AT = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
 PLANE, SPHERE, CYLINDER = 0, 1, 2
-KINDS = ("plane", "sphere", "cylinder")
+KINDS = ("plane", "sphere", "cylinder", "cone", "freeform")
 NO_FIT = 1e300
 NORMAL_WEIGHT = 0.003  # lambda: how far (in diagonals) a normal error of 1 counts as a distance
 LARGEST_RADIUS = 1e3  # diagonals; flatter is a plane
@@ -47,7 +47,7 @@ def face_sums(vertices: Array, faces: NDArray[np.integer]) -> Array:
 
 
 @nb.njit(cache=True)
-def _smallest_eigen(s, vector):  # pragma: no cover - compiled
+def smallest_eigen(s, vector):  # pragma: no cover - compiled
     """Smallest eigenvalue of the symmetric s (3, 3), which is overwritten; fills its unit eigenvector (cyclic Jacobi)."""
     u = np.eye(3)
     for _ in range(15):
@@ -79,7 +79,7 @@ def _smallest_eigen(s, vector):  # pragma: no cover - compiled
 
 
 @nb.njit(cache=True)
-def _solve3(a, b):  # pragma: no cover - compiled
+def solve3(a, b):  # pragma: no cover - compiled
     """Cramer's rule, b becomes the solution; False when singular."""
     c00 = a[1, 1] * a[2, 2] - a[1, 2] * a[2, 1]
     c01 = a[1, 2] * a[2, 0] - a[1, 0] * a[2, 2]
@@ -126,7 +126,7 @@ def _round_fit(m, across, spread, g, centre):  # pragma: no cover - compiled
     for a in range(3):
         for b in range(3):
             lhs[a, b] = flat[a, b] / trace + ((1.0 if a == b else 0.0) - across[a, b])  # identity along the axis
-    if not _solve3(lhs, c):
+    if not solve3(lhs, c):
         return NO_FIT, 0.0
     r2 = c[0] * c[0] + c[1] * c[1] + c[2] * c[2] + s1 / w
     if r2 <= 0 or r2 > LARGEST_RADIUS * LARGEST_RADIUS:
@@ -155,7 +155,7 @@ def fit(m, weight, out):  # pragma: no cover - compiled
     for a in range(3):
         for b in range(3):
             spread[a, b] = work[a, b] = m[PRODUCT[1 + a, 1 + b]] - w * g[a] * g[b]
-    flatness = _smallest_eigen(work, axis)
+    flatness = smallest_eigen(work, axis)
     along = abs(m[NORMAL] * axis[0] + m[NORMAL + 1] * axis[1] + m[NORMAL + 2] * axis[2])
     best = max(flatness, 0.0) + 2 * weight * weight * max(m[AREA] - along, 0.0)
     out[0], out[1], out[2], out[3], out[4] = PLANE, 0.0, 0.0, 0.0, 0.0
@@ -164,8 +164,8 @@ def fit(m, weight, out):  # pragma: no cover - compiled
         if kind == CYLINDER:  # the axis is the direction that normals avoid
             for a in range(3):
                 for b in range(3):
-                    work[a, b] = m[NORMAL2 + _NORMAL2_AT[a, b]]
-            _smallest_eigen(work, axis)
+                    work[a, b] = m[NORMAL2 + NORMAL2_AT[a, b]]
+            smallest_eigen(work, axis)
             for a in range(3):
                 for b in range(3):
                     across[a, b] -= axis[a] * axis[b]

@@ -9,11 +9,13 @@ from collections.abc import Callable
 import numba as nb
 import numpy as np
 
-from app.geometry.fitting import AREA, NORMAL_WEIGHT, fit
+from app.geometry.fitting import AREA, NORMAL_WEIGHT
 from app.geometry.merge_tree import Integers, MergeTree, sums_up
+from app.geometry.quadrics import fit_any
 from app.geometry.tool import Array
 
 CHUNK = 20_000  # merges between two progress reports
+RICH_BELOW = 3_000  # clusters left from which general quadrics are fitted too: they take longer, and small clusters need none
 
 
 @nb.njit(cache=True)
@@ -74,16 +76,16 @@ def _first_time(table, a, b, total):  # pragma: no cover - compiled
 
 
 @nb.njit(cache=True)
-def _fill(sums, pairs, weight, key, heap_pair):  # pragma: no cover - compiled
+def _fill(sums, slot, pairs, weight, rich, key, heap_pair):  # pragma: no cover - compiled
     out, n = np.empty(5), 0
     for e in range(len(pairs)):
         a, b = pairs[e, 0], pairs[e, 1]
-        n = _push(key, heap_pair, n, fit(sums[a] + sums[b], weight, out), a, b)
+        n = _push(key, heap_pair, n, fit_any(sums[slot[a]] + sums[slot[b]], weight, rich, out), a, b)
     return n
 
 
 @nb.njit(cache=True)
-def _advance(sums, slot, parent, key, heap_pair, n, table, weight, merges, costs, done, until):  # pragma: no cover - compiled
+def _advance(sums, slot, parent, key, heap_pair, n, table, weight, rich, merges, costs, done, until):  # pragma: no cover - compiled
     """Merge until `until` merges are done or nothing is left; returns (heap size, merges done)."""
     leaves, total = len(sums), len(parent)
     out = np.empty(5)
@@ -105,9 +107,17 @@ def _advance(sums, slot, parent, key, heap_pair, n, table, weight, merges, costs
         if ra > rb:
             ra, rb = rb, ra
         if _first_time(table, ra, rb, total):
-            value = fit(sums[slot[ra]] + sums[slot[rb]], weight, out)
+            value = fit_any(sums[slot[ra]] + sums[slot[rb]], weight, rich, out)
             n = _push(key, heap_pair, n, max(value, bound), ra, rb)
     return n, done
+
+
+def _roots(parent: Integers, pairs: Integers) -> Integers:
+    """Neighbouring clusters after the merges so far, each pair once."""
+    top = parent[pairs]
+    while (top != parent[top]).any():
+        top = parent[top]
+    return np.unique(np.sort(top[top[:, 0] != top[:, 1]], axis=1), axis=0)
 
 
 def build_tree(sums: Array, leaf: Integers, pairs: Integers, progress: Callable[[float], None], weight: float = NORMAL_WEIGHT) -> MergeTree:
@@ -122,14 +132,17 @@ def build_tree(sums: Array, leaf: Integers, pairs: Integers, progress: Callable[
     """
     leaves = len(sums)
     pairs = np.unique(np.sort(pairs, axis=1), axis=0).astype(np.int64) if len(pairs) else np.empty((0, 2), np.int64)
-    pairs = pairs[pairs[:, 0] != pairs[:, 1]]
     work, slot, parent = sums.copy(), np.zeros(2 * leaves, np.int64), np.arange(2 * leaves)
     slot[:leaves] = np.arange(leaves)
-    key, heap_pair = np.empty(len(pairs) + 1), np.empty((len(pairs) + 1, 2), np.int64)
-    table = np.zeros(1 << max(10, int(np.ceil(np.log2(4 * len(pairs) + 4)))), np.int64)
-    merges, costs = np.empty((leaves, 2), np.int64), np.empty(leaves)
-    n, done = _fill(work, pairs, weight, key, heap_pair), 0
-    while n > 0:
-        n, done = _advance(work, slot, parent, key, heap_pair, n, table, weight, merges, costs, done, done + CHUNK)
-        progress(done / max(1, leaves - 1))
+    merges, costs, done = np.empty((leaves, 2), np.int64), np.empty(leaves), 0
+    for rich in (False, True):
+        until = leaves if rich else max(0, leaves - RICH_BELOW)
+        pairs = _roots(parent, pairs)
+        key, heap_pair = np.empty(len(pairs) + 1), np.empty((len(pairs) + 1, 2), np.int64)
+        table = np.zeros(1 << max(10, int(np.ceil(np.log2(4 * len(pairs) + 4)))), np.int64)
+        n = _fill(work, slot, pairs, weight, rich, key, heap_pair) if until > done else 0
+        while n > 0 and done < until:
+            stop = min(until, done + CHUNK)
+            n, done = _advance(work, slot, parent, key, heap_pair, n, table, weight, rich, merges, costs, done, stop)
+            progress(done / max(1, leaves - 1))
     return MergeTree(leaf.astype(np.int64), merges[:done].copy(), costs[:done].copy(), sums_up(merges[:done], sums[:, AREA]))

@@ -1,0 +1,195 @@
+"""Fit a cone or a general quadric to a cluster of triangles from the same 54 numbers as plane, sphere and cylinder.
+
+The general quadric f is the least-squares solution of int f^2 + weight^2 int |grad f - n|^2: ten linear equations. As the
+gradient is asked to be the unit normal, f is nearly a distance, and what is left over is the cost itself. It describes
+freeform patches (ellipsoids, saddles, ruled patches), which no other primitive fits.
+"""
+
+import numba as nb
+import numpy as np
+
+from app.geometry.fitting import AREA, NO_FIT, NORMAL, NORMAL2, NORMAL2_AT, NORMAL_CENTRE, PRODUCT, SQUARE, fit, smallest_eigen, solve3
+
+CONE, QUADRIC = 3, 4
+# a quadric has more freedom than the other primitives (9 against 3 to 6 numbers) and fits two of them joined smoothly; its
+# cost counts this many times, so that it only takes what none of them describes
+FREEDOM = 4.0
+RIDGE = 1e-11  # keeps the ten equations solvable for planes, where many quadrics agree
+STEEPEST, SHALLOWEST = 0.996, 0.05  # cosine between a cone's normals and its axis beyond which it is a plane or a cylinder
+APEX = 2.0  # least square of the apex distance over the variance of the height; less means that the apex lies inside
+
+_GRADIENT = np.zeros((3, 10, 4))  # component, monomial -> combination of (1, x, y, z)
+for _c in range(3):
+    _GRADIENT[_c, 1 + _c, 0] = 1
+    for _d in range(3):
+        _GRADIENT[_c, SQUARE[_c, _d], 1 + _d] += 2 if _c == _d else 1
+_TERMS = [
+    (i, j, PRODUCT[k, m], float(_GRADIENT[c, i, k] * _GRADIENT[c, j, m]))
+    for i in range(10)
+    for j in range(i + 1)
+    for c in range(3)
+    for k in range(4)
+    for m in range(4)
+    if _GRADIENT[c, i, k] * _GRADIENT[c, j, m]
+]
+_TERM_AT = np.array([t[:3] for t in _TERMS])
+_TERM_BY = np.array([t[3] for t in _TERMS])
+_SLOPES = [
+    (i, NORMAL + c if k == 0 else NORMAL_CENTRE + 3 * c + k - 1, float(_GRADIENT[c, i, k]))
+    for c in range(3)
+    for i in range(10)
+    for k in range(4)
+    if _GRADIENT[c, i, k]
+]
+_SLOPE_AT = np.array([t[:2] for t in _SLOPES])
+_SLOPE_BY = np.array([t[2] for t in _SLOPES])
+
+
+@nb.njit(cache=True)
+def _solve_spd(a, b):  # pragma: no cover - compiled
+    """Cholesky: b becomes the solution of a b = b for a symmetric positive definite (lower half used); False when it is not."""
+    n = len(b)
+    for j in range(n):
+        s = a[j, j]
+        for k in range(j):
+            s -= a[j, k] * a[j, k]
+        if s <= 0:
+            return False
+        root = np.sqrt(s)
+        a[j, j] = root
+        for i in range(j + 1, n):
+            s = a[i, j]
+            for k in range(j):
+                s -= a[i, k] * a[j, k]
+            a[i, j] = s / root
+    for i in range(n):
+        for k in range(i):
+            b[i] -= a[i, k] * b[k]
+        b[i] /= a[i, i]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            b[i] -= a[k, i] * b[k]
+        b[i] /= a[i, i]
+    return True
+
+
+@nb.njit(cache=True)
+def fit_quadric(m, weight, q):  # pragma: no cover - compiled
+    """Cost of the best general quadric; fills its ten coefficients."""
+    a, right = np.empty((10, 10)), np.zeros(10)
+    square = weight * weight
+    for i in range(10):
+        for j in range(i + 1):
+            a[i, j] = m[PRODUCT[i, j]]
+        a[i, i] += RIDGE * m[0]
+    for t in range(len(_TERM_BY)):
+        a[_TERM_AT[t, 0], _TERM_AT[t, 1]] += square * _TERM_BY[t] * m[_TERM_AT[t, 2]]
+    for t in range(len(_SLOPE_BY)):
+        right[_SLOPE_AT[t, 0]] += square * _SLOPE_BY[t] * m[_SLOPE_AT[t, 1]]
+    q[:] = right
+    if not _solve_spd(a, q):
+        return NO_FIT
+    gained = 0.0
+    for i in range(10):
+        gained += right[i] * q[i]
+    return max(square * m[AREA] - gained, 0.0)
+
+
+@nb.njit(cache=True)
+def fit_cone(m, weight, out):  # pragma: no cover - compiled
+    """Cost of the best circular cone; fills curvature at the middle (signed, 1 / distance to the axis along the normal) and axis.
+
+    The axis is the direction along which normals all have the same component; with it the cone is linear in what is left.
+    """
+    w, area = m[0], m[AREA]
+    work, spread, s2 = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    axis, g, c, sx = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    for a in range(3):
+        g[a] = m[PRODUCT[0, 1 + a]] / w
+        for b in range(3):
+            work[a, b] = m[NORMAL2 + NORMAL2_AT[a, b]] - m[NORMAL + a] * m[NORMAL + b] / area
+    for a in range(3):
+        for b in range(3):
+            spread[a, b] = m[PRODUCT[1 + a, 1 + b]] - w * g[a] * g[b]
+    varying = max(smallest_eigen(work, axis), 0.0)
+    lean = (m[NORMAL] * axis[0] + m[NORMAL + 1] * axis[1] + m[NORMAL + 2] * axis[2]) / area
+    if abs(lean) > STEEPEST or abs(lean) < SHALLOWEST:
+        return NO_FIT
+    slope2 = lean * lean / (1 - lean * lean)
+    for a in range(3):
+        for b in range(3):
+            s2[a, b] = (1.0 if a == b else 0.0) - (1 + slope2) * axis[a] * axis[b]
+    row = np.zeros(10)
+    for a in range(3):
+        sg = s2[a, 0] * g[0] + s2[a, 1] * g[1] + s2[a, 2] * g[2]
+        row[0] += g[a] * sg
+        row[1 + a] -= 2 * sg
+        for b in range(3):
+            row[SQUARE[a, b]] += s2[a, b]
+    ss, sq = 0.0, np.zeros(10)
+    for i in range(10):
+        for j in range(10):
+            sq[i] += row[j] * m[PRODUCT[i, j]]
+        ss += row[i] * sq[i]
+    scale = spread[0, 0] + spread[1, 1] + spread[2, 2]
+    for a in range(3):
+        sx[a] = sq[1 + a] - g[a] * sq[0]
+        c[a] = sx[a] / (2 * scale)
+        for b in range(3):
+            work[a, b] = spread[a, b] / scale
+    if scale <= 0 or not solve3(work, c):
+        return NO_FIT
+    error, steep2 = ss - sq[0] * sq[0] / w, c[0] * c[0] + c[1] * c[1] + c[2] * c[2]
+    radial = 0.0
+    for a in range(3):
+        error -= 4 * c[a] * sx[a]
+        for b in range(3):
+            error += 4 * c[a] * spread[a, b] * c[b]
+            part = 0.0
+            for k in range(3):
+                part += s2[a, k] * spread[k, b]
+            steep2 += part * s2[a, b] / w
+            radial += s2[a, b] * (m[NORMAL_CENTRE + 3 * a + b] - m[NORMAL + a] * g[b])
+        radial -= m[NORMAL + a] * c[a]
+    if steep2 <= 0:
+        return NO_FIT
+    steep = np.sqrt(steep2)
+    out[1] = (1.0 if radial >= 0 else -1.0) / steep
+    for a in range(3):
+        out[2 + a] = axis[a]
+    # |grad f| grows with the distance h from the apex; what it varies by on a true cone is no error of the normals
+    var, apex, tip = 0.0, 0.0, -sq[0] / w
+    for a in range(3):
+        apex += c[a] * axis[a] / slope2
+        tip -= c[a] * c[a]
+        for b in range(3):
+            var += axis[a] * spread[a, b] * axis[b] / w
+    if apex * apex < APEX * var:
+        return NO_FIT  # two nappes
+    tip += apex * apex * slope2 * (1 + slope2)  # f at the apex, 0 on a true cone; what is left is a hyperboloid
+    error = max(error, 0.0) + w * tip * tip
+    mean2 = slope2 * (1 + slope2) * (apex * apex + var)  # of |grad f| on a true cone
+    astray = max(1 - radial * radial / (area * area * steep2) - var / (apex * apex + var), 0.0) + abs(mean2 / steep2 - 1)
+    return error / (4 * steep2) + weight * weight * (area * astray + varying)
+
+
+@nb.njit(cache=True)
+def fit_any(m, weight, freeform, out):  # pragma: no cover - compiled
+    """Cost of the best of all primitives (`freeform`: a general quadric too).
+
+    `out` as for `fit`, with the kinds CONE and QUADRIC (its curvature stays 0).
+    """
+    best = fit(m, weight, out)
+    other = np.empty(5)
+    cost = fit_cone(m, weight, other)
+    if cost < best:
+        best = cost
+        out[0], out[1] = CONE, other[1]
+        out[2], out[3], out[4] = other[2], other[3], other[4]
+    if freeform and best > 0:
+        q = np.empty(10)
+        cost = FREEDOM * fit_quadric(m, weight, q)
+        if cost < best:
+            best = cost
+            out[0], out[1], out[2], out[3], out[4] = QUADRIC, 0.0, 0.0, 0.0, 0.0
+    return best
