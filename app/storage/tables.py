@@ -36,6 +36,16 @@ def json_column(nullable: bool = False) -> Any:
     return Field(default=None, sa_column=Column(JSON(none_as_null=True), nullable=nullable))
 
 
+def list_column() -> Any:
+    """A JSON column that starts as []."""
+    return Field(default_factory=list, sa_column=Column(JSON(none_as_null=True), nullable=False, server_default="[]"))
+
+
+def object_column() -> Any:
+    """A JSON column that starts as {}."""
+    return Field(default_factory=dict, sa_column=Column(JSON(none_as_null=True), nullable=False, server_default="{}"))
+
+
 def owned(target: str, nullable: bool = False) -> Any:
     """A foreign key with an index."""
     return Field(default=None, sa_column=Column(ForeignKey(target), nullable=nullable, index=True))
@@ -50,9 +60,41 @@ class Project(SQLModel, table=True):
     process: str = ""
     sample: bool = False
     interactions: list[dict[str, str]] = json_column()  # [{first, second}]
+    template: str | None = None  # the process template it started from: a built-in key or an id
+    without: list[str] = list_column()  # factors switched off
+    own: list[str] = list_column()  # own features switched on, "key@version"
+    levels: Json = object_column()  # {default, chosen: {factor: rule}, expert: {factor: [low, high]}}
     version: int = 1
     created_at: str = Field(default_factory=now)
     updated_at: str = Field(default_factory=now)
+    deleted_at: str | None = None
+
+
+class OwnFeatureRow(SQLModel, table=True):
+    """A feature that an engineer wrote, kept as it was when it was switched on: policies go on using that text."""
+
+    __tablename__ = "own_feature"  # pyright: ignore[reportAssignmentType]
+    id: str = Field(primary_key=True)  # "key@version"
+    key: str
+    label: str
+    source: str
+    created_at: str = Field(default_factory=now)
+
+
+class ProcessTemplateRow(SQLModel, table=True):
+    """A process template that an engineer saved."""
+
+    __tablename__ = "process_template"  # pyright: ignore[reportAssignmentType]
+    __table_args__ = (CheckConstraint("length(name) BETWEEN 1 AND 200", name="name"),)
+    id: str = Field(default_factory=new_id, primary_key=True)
+    name: str
+    why: str
+    without: list[str] = list_column()
+    own: list[str] = list_column()
+    interactions: list[dict[str, str]] = json_column()
+    levels: Json = object_column()
+    version: int = 1
+    created_at: str = Field(default_factory=now)
     deleted_at: str | None = None
 
 
@@ -184,6 +226,7 @@ class Run(SQLModel, table=True):
     seed: int
     params: Json = json_column()
     interactions: list[dict[str, str]] = json_column()
+    features: str | None = None  # name of the feature set; None on runs of earlier versions: that of the demonstrated tools
     checkpoint: int = 0  # number of the current checkpoint, 0 before the first
     based_on: str | None = None  # effort: the performance policy
     policy_id: str | None = None

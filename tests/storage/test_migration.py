@@ -23,7 +23,19 @@ def parts(database: Path) -> dict[str, list[str]]:
     """Everything in the schema: per table or index its definitions in a fixed order, white space and quotes aside."""
     with closing(sqlite3.connect(database)) as connection:
         rows = connection.execute("SELECT name, sql FROM sqlite_master WHERE sql IS NOT NULL AND name != 'alembic_version'").fetchall()
-    return {name: sorted(re.sub(r'[\s"]+', "", part) for part in re.split(r",\s*\n|\n\s*\)\s*$", sql)) for name, sql in rows}
+    return {name: sorted(re.sub(r'[\s"]+', "", part) for part in definitions(sql)) for name, sql in rows}
+
+
+def definitions(sql: str) -> list[str]:
+    """What stands before, between and after the commas of the outermost parentheses."""
+    depth, found = 0, [""]
+    for sign in sql:
+        depth += (sign == "(") - (sign == ")")
+        if (sign, depth) in ((",", 1), ("(", 1), (")", 0)):
+            found.append("")
+        else:
+            found[-1] += sign
+    return found
 
 
 def test_migrations_equal_the_tables(settings: Settings, tmp_path: Path) -> None:
