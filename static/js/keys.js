@@ -6,9 +6,11 @@ import { h } from "./dom.js";
 
 const bindings = [];
 
+const shownKey = (key, ctrl) => `${ctrl ? "Ctrl " : ""}${key.length === 1 ? key.toUpperCase() : key}`;
+
 // key: event.key or a test (key) => boolean; shown: what the help prints; when: () => boolean.
 export function bind({ key, ctrl = false, shift = null, alt = false, name, shown, when = () => true, run }) {
-  const entry = { key, ctrl, shift, alt, name, shown: shown ?? (ctrl ? `Ctrl ${String(key).toUpperCase()}` : String(key)), when, run };
+  const entry = { key, ctrl, shift, alt, name, shown: shown ?? shownKey(String(key), ctrl), when, run };
   bindings.push(entry);
   return () => bindings.splice(bindings.indexOf(entry), 1);
 }

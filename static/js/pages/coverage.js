@@ -48,12 +48,12 @@ function paintHead() {
 }
 
 function paintSummary() {
-  const { rho, captured, possible, rule } = state.report;
+  const { rho, captured, shown, possible, rule } = state.report;
   dial(parts.dial, rho, GOAL);
   parts.dial.setAttribute("aria-valuenow", rho.toFixed(2));
-  parts.dial.dataset.tip = `rho = captured / possible = ${captured} / ${possible}\nEq. 6. ${rule}`;
+  parts.dial.dataset.tip = `rho = captured / possible = ${captured} / ${possible}\nShown at all: ${shown} / ${possible}\nEq. 6. ${rule}`;
   fill(parts.summary, h("h2", {}, `${captured} of ${plural(possible, "possible situation")} ${captured === 1 ? "is" : "are"} covered`),
-    h("p.muted.small", {}, `A situation counts when your demonstrations contain it and everything else about those steps is evenly spread. Below ${GOAL} a policy is a draft.`));
+    h("p.muted.small", {}, `A situation counts when your demonstrations contain it and everything else about those steps is evenly spread; ${shown} of ${possible} are shown at all. Below ${GOAL} a policy is a draft.`));
 }
 
 function cell(table, t, i, j) {
@@ -79,7 +79,7 @@ function matrix(table, t) {
 function paintRequests() {
   const { requests } = state.report;
   fill(parts.requests, requests.length ? requests.map((request, index) => h("button", { type: "button", dataset: { key: `request-${index}` }, "aria-pressed": String(state.chosen?.request === index), onclick: () => choose({ request: index }) },
-    h("b.strong", {}, request.tool_name), h("span.gain", { dataset: { tip: request.gain > 0 ? "How much rho can rise with this demonstration, by the best of a few orders" : "It shows a situation nobody has shown, but makes another less even" } }, request.gain > 0 ? `+${request.gain.toFixed(2)}` : "new"), h("span.small.muted", {}, request.text))) : h("p.empty-words.small", { style: { padding: "var(--s-3) var(--s-4)" } }, "Your tools show no further situation. New shapes would need a new tool."));
+    h("b.strong", {}, request.tool_name), h("span.gain", { dataset: { tip: request.gain > 0 ? `How much rho can rise with this demonstration, by the best of a few orders; ${request.expected >= 0 ? "+" : ""}${request.expected.toFixed(2)} on average over them` : "It shows a situation nobody has shown, but makes another less even" } }, request.gain > 0 ? `+${request.gain.toFixed(2)}` : "new"), h("span.small.muted", {}, request.text))) : h("p.empty-words.small", { style: { padding: "var(--s-3) var(--s-4)" } }, "Your tools show no further situation. New shapes would need a new tool."));
 }
 
 function shown() {

@@ -1,4 +1,5 @@
-// The saved demonstrations of the project: replay, rename, delete with undo, record again.
+// The saved demonstrations of the project: replay, rename, delete with undo, record again; those on an older cut of their tool say
+// so and can be carried over where every region still has its counterpart.
 
 import { all, patch, post, remove } from "../api.js";
 import { fill, h } from "../dom.js";
@@ -45,10 +46,31 @@ export class SavedList {
       await this.load();
     });
     name.classList.add("demo-name");
-    const button = (mark, words, run) => h("button.icon-btn", { type: "button", "aria-label": `${words}: ${item.name}`, dataset: { tip: words, key: `${mark}-${item.id}` }, onclick: run }, icon(mark));
+    const old = item.on_current_cut === false && !item.superseded_by;
+    const replay = item.on_current_cut === false ? this.button(item, "play", "Replay", null, "Recorded on an older cut of this tool; the 3D view shows the regions of today") : this.button(item, "play", "Replay", () => this.onReplay(item));
     return h(`li${item.superseded_by ? ".old" : ""}`, { dataset: { demonstration: item.id } }, name, h("span.demo-facts", {}, facts),
-      h("span.demo-actions", {}, button("play", "Replay", () => this.onReplay(item)), item.superseded_by ? null : button("again", "Record again", () => this.onAgain(item)), button("trash", "Delete", () => this.discard(item))),
-      strip(item.sequence, this.regions.get(item.tool_id) ?? []));
+      h("span.demo-actions", {}, replay, item.superseded_by ? null : this.button(item, "again", "Record again", () => this.onAgain(item)), this.button(item, "trash", "Delete", () => this.discard(item))),
+      old ? this.older(item) : item.on_current_cut === false ? null : strip(item.sequence, this.regions.get(item.tool_id) ?? []));
+  }
+
+  button(item, mark, words, run, reason = "") {
+    return h("button.icon-btn", { type: "button", "aria-label": `${words}: ${item.name}`, "aria-disabled": run ? null : "true", dataset: { tip: reason || words, key: `${mark}-${item.id}` }, onclick: () => run?.() }, icon(mark));
+  }
+
+  // The regions have changed since: what happened to them, and the way on.
+  older(item) {
+    const words = item.can_carry_over ? "Recorded on an older cut. Every region still has its counterpart." : `Recorded on an older cut. ${item.why}`;
+    return h("div.note.warn.demo-older", {}, icon("history"), h("p", {}, words), item.can_carry_over ? h("button.btn.small", { type: "button", dataset: { key: `carry-${item.id}` }, onclick: () => this.carry(item) }, "Carry over") : null);
+  }
+
+  async carry(item) {
+    try {
+      const carried = await post(`/demonstrations/${encodeURIComponent(item.id)}/carry-over`);
+      toast(`${carried.name} carried over to the regions of today`);
+    } catch (error) {
+      complain(error);
+    }
+    return this.load();
   }
 
   async discard(item) {

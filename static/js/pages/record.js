@@ -13,6 +13,7 @@ import { View3D } from "../view3d.js";
 import { plural } from "../words.js";
 import { SavedList } from "./record-saved.js";
 import { letterKeys } from "./region-letters.js";
+import { reorderable } from "./reorder.js";
 
 const SPEEDS = [1, 2, 4, 0.5];
 const STEP_MS = 700;
@@ -242,9 +243,18 @@ function paintList() {
   const open = rest();
   fill(parts.left, open.length ? open.map((entry) => h("button", { type: "button", dataset: { key: `left-${entry.id}`, tip: entry.description }, "aria-label": `${entry.name}, ${entry.description}`, onclick: () => pick(entry.id) },
     h("span.swatch.pastel", { style: { "--swatch": tint(entry.id) } }), entry.name)) : h("span.small.muted", {}, "Every region has its number."));
-  const text = draft.coverage_gain?.text;
-  parts.gain.hidden = !text;
-  if (text) fill(parts.gain, icon("rise"), h("p", {}, text));
+  paintGain();
+}
+
+// What saving would bring, or an order begun on regions that have changed since.
+function paintGain() {
+  const { older, coverage_gain: gain } = state.draft;
+  parts.gain.hidden = !older && !gain?.text;
+  parts.gain.classList.toggle("older", Boolean(older));
+  if (older) {
+    const words = `${plural(older.placed, "region")} had a number on an older cut of this tool.`;
+    fill(parts.gain, icon("history"), h("p", {}, older.can_carry_over ? words : `${words} ${older.why}`), older.can_carry_over ? h("button.btn.small", { type: "button", dataset: { key: "carry-draft" }, onclick: () => change(() => post(address("/carry-over")), () => "Carried over") }, "Carry over") : null);
+  } else if (gain?.text) fill(parts.gain, icon("rise"), h("p", {}, gain.text));
 }
 
 function paintTools() {
@@ -264,40 +274,6 @@ function paintView() {
   const { tool, draft, replay } = state;
   if (replay) return state.view.show({ mode: "sequence", tool_id: tool.id, sequence: replay.sequence, step: replay.step }, `${tool.name} after step ${replay.step} of ${replay.sequence.length}`);
   return state.view.show({ mode: "record", tool_id: tool.id }, `3D view of ${tool.name}: ${draft.sequence.length} of ${state.regions.length} regions are numbered`);
-}
-
-// ---- list by mouse and keyboard ------------------------------------------------------------------------------------------------
-
-function reorderable(list) {
-  let lifted = -1;
-  const place = (event) => [...list.children].indexOf(event.target.closest("li"));
-  const unmark = () => [...list.children].forEach((item) => item.removeAttribute("data-drag"));
-  list.addEventListener("keydown", (event) => {
-    const by = { ArrowUp: -1, ArrowDown: 1 }[event.key];
-    const at = place(event);
-    if (!by || at < 0) return;
-    event.preventDefault();
-    if (event.altKey) move(at, at + by);
-    else list.children[at + by]?.focus();
-  });
-  list.addEventListener("dragstart", (event) => {
-    lifted = place(event);
-    event.dataTransfer.effectAllowed = "move";
-  });
-  list.addEventListener("dragover", (event) => {
-    if (lifted < 0) return;
-    event.preventDefault();
-    unmark();
-    list.children[place(event)]?.setAttribute("data-drag", "over");
-  });
-  list.addEventListener("drop", (event) => {
-    event.preventDefault();
-    move(lifted, place(event));
-  });
-  list.addEventListener("dragend", () => {
-    lifted = -1;
-    unmark();
-  });
 }
 
 // ---- reading -----------------------------------------------------------------------------------------------------------------
@@ -361,7 +337,7 @@ async function recordAgain(demonstration) {
 }
 
 function bindAll() {
-  reorderable(parts.list);
+  reorderable(parts.list, move);
   letterKeys({ regions: () => state.regions, pick });
   bind({ key: "z", ctrl: true, shift: false, name: "Undo", run: () => act("undo") });
   bind({ key: "z", ctrl: true, shift: true, name: "Redo", shown: "Ctrl Shift Z", run: () => act("redo") });

@@ -77,7 +77,7 @@ const OUTCOMES = {
   stalled: () => ({ tone: "warn", mark: "warn", title: "Nothing is left to ask", text: "Every order that was shown is as good as yours by your own answers. You can take what was learned, or record one more demonstration." }),
   infeasible: () => ({ tone: "bad", mark: "warn", title: "Some demonstrations contradict each other", text: "No weights explain all of them. Nothing is lost: record one again, or go on with the weights that explain the most." }),
   failed: () => ({ tone: "bad", mark: "warn", title: "The run stopped with an error", text: "It can go on from where it was saved last." }),
-  cancelled: () => ({ tone: "", mark: "stop", title: "The run was stopped", text: "Answers that were given stay in the history." }),
+  cancelled: () => ({ tone: "", mark: "stop", title: "The run was stopped", text: "Your answers are kept." }),
 };
 
 // Links to the tools whose orders contradict the others; to all demonstrations where it isn't known which they are.
@@ -91,7 +91,7 @@ function outcomeActions(run, project, act, tools) {
   const button = (words, action, primary = false) => h(`button.btn${primary ? ".primary" : ""}`, { type: "button", onclick: () => act(action).catch(complain) }, words);
   if (run.state === "converged") return [h("a.btn.primary", { href: pageAddress(project.id, "policy") }, "See the policy")];
   if (run.state === "stalled") return [button("Take what was learned", "finish", true), h("a.btn", { href: pageAddress(project.id, "coverage") }, "What to record next")];
-  if (run.state === "failed") return [button("Go on", "resume", true)];
+  if (run.state === "failed" || run.state === "cancelled") return [button("Go on", "resume", true)];
   if (run.state === "infeasible") return [...recordAgain(run, project, tools), button("Use the best compromise", "finish")];
   return [];
 }

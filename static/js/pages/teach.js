@@ -145,7 +145,7 @@ async function drawEnded() {
   const cards = await startCards({ project: shell.project, runs: state.runs, onStarted: started });
   const tools = run.state === "infeasible" ? await all(`/projects/${encodeURIComponent(shell.projectId)}/tools`) : [];
   if (run.state === "converged" && run.kind === "performance") cards.querySelectorAll(".btn.primary").forEach((button) => button.classList.remove("primary"));
-  else if (["stalled", "failed", "converged", "infeasible"].includes(run.state)) cards.querySelectorAll(".btn.primary").forEach((button) => button.classList.remove("primary"));
+  else if (["stalled", "failed", "cancelled", "converged", "infeasible"].includes(run.state)) cards.querySelectorAll(".btn.primary").forEach((button) => button.classList.remove("primary"));
   training.node.open = false;
   fill(shell.main, head(`The last run used ${plural(run.tools.length, "demonstration")}.`), outcomeCard({ run, project: shell.project, act: runAction, tools }), cards, training.node, history());
 }

@@ -32,7 +32,7 @@ const editor = new Editor({ onChange: repaint, onTool: replaceTool, onRename: (r
 }, onOutdated: () => freshen(state.tool.id) });
 const toolbar = new Toolbar(editor);
 const tools = h("div.tool-list");
-const list = h("div.fill", { style: { flex: "1" } }, uploads.node, h("div.scroll", {}, tools), uploadExtras());
+const list = h("div.fill", { style: { flex: "1" } }, h("div.scroll", {}, tools), uploadExtras());
 const column = h("nav.card.fill", { "aria-label": "Tools" });
 const panel = new ToolPanel({ editor, list, onChanged: (tool) => replaceTool(tool).catch(complain), onCarried: () => load(), reload: () => load().catch(complain) });
 const head = h("div.head");
@@ -84,8 +84,13 @@ function drawHead() {
   head.querySelector(".next")?.style.setProperty("margin-left", "0");
 }
 
+function asked({ units, up, body } = {}) {
+  const words = [body && "which body is it", units && "how large is it", up && "which way is up"].filter(Boolean);
+  return `${sentence(words.length > 1 ? `${words.slice(0, -1).join(", ")}, and ${words.at(-1)}` : (words[0] ?? "what is it"))}?`;
+}
+
 const COVERS = {
-  asking: (tool) => ["How large is it, and which way is up?", `${tool.file_name ?? tool.name} does not say. Answer on the right, then it is cut into regions.`],
+  asking: (tool) => [asked(tool.questions ?? {}), `${tool.file_name ?? tool.name} does not say. Answer on the right, then it is cut into regions.`],
   importing: (tool) => ["Cutting it into regions", tool.job?.message || "This takes a few seconds."],
   failed: () => ["There is nothing to show", "The file could not be used; the reason is on the right."],
 };
@@ -94,7 +99,7 @@ function drawStage() {
   const { tool } = state;
   const words = COVERS[tool.state]?.(tool);
   cover.hidden = !words;
-  toolbar.node.hidden = !tool.edit;
+  toolbar.node.hidden = !tool.edit || tool.state !== "ready";
   if (words) fill(cover, h("h2", {}, words[0]), h("p", {}, words[1]));
   if (tool.state !== "ready") return state.view.show({ mode: "empty", tool_id: null }, "No tool is shown");
   return state.view.show({ mode: tool.edit ? "edit" : "tool", tool_id: tool.id }, `3D view of ${tool.name} with ${plural(tool.region_count, "lettered region")}`);
@@ -121,10 +126,10 @@ function repaint(what = "") {
 
 async function readRegions(tool) {
   if (tool.state !== "ready") return editor.show(tool, []);
-  const [regions] = await Promise.all([all(`/tools/${encodeURIComponent(tool.id)}/regions`)]);
+  const regions = await all(`/tools/${encodeURIComponent(tool.id)}/regions`);
   if (state.tool?.id !== tool.id) return undefined;
-  editor.show(tool, regions.sort((a, b) => a.id - b.id));
-  return panel.load(tool);
+  panel.load(tool).then(() => repaint()).catch(complain);
+  return editor.show(tool, regions.sort((a, b) => a.id - b.id));
 }
 
 async function open(id) {
@@ -210,9 +215,13 @@ function progress(id, job) {
 // The list of tools has a column of its own in a wide window; in a narrow one it is a tab of the panel.
 function arrange() {
   const wide = matchMedia(WIDE).matches;
-  if (wide) fill(column, h("div.card-head", {}, h("h2", {}, "All tools")), list);
-  if (wide) body.prepend(column);
-  else column.remove();
+  if (wide) {
+    fill(column, h("div.card-head", {}, h("h2", {}, "All tools")), uploads.node, list);
+    body.prepend(column);
+  } else {
+    column.remove();
+    panel.node.insertBefore(uploads.node, panel.body);
+  }
   panel.wide = wide;
   panel.inside = "";
   if (state.tool) panel.show(state.tool);
