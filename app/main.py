@@ -24,6 +24,7 @@ from app.api import (
     queries,
     reference,
     runs,
+    segmentations,
     server,
     sessions,
     tools,
@@ -38,7 +39,7 @@ from app.workflow.projects import get_project
 VERSION = "0.1.0"
 STATIC = ROOT / "static"
 HOSTS = ("127.0.0.1", "localhost", "::1")
-NOUNS = (projects, tools, drafts, demonstrations, coverage, runs, queries, policies, playbacks, sessions, events)
+NOUNS = (projects, tools, segmentations, drafts, demonstrations, coverage, runs, queries, policies, playbacks, sessions, events)
 DESCRIPTION = "Learns in which order an expert works on the regions of a part, and shows a robot doing it on another part."
 PROBLEMS: dict[int | str, dict[str, Any]] = {
     "4XX": {"model": errors.Problem, "description": "Refused; the body says why and what is accepted."},

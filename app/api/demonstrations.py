@@ -39,6 +39,9 @@ class Demonstration(Row):
     superseded_by: str | None
     deleted: bool
     segmentation_id: str
+    on_current_cut: bool
+    can_carry_over: bool
+    why: str
     version: int
     created_at: str
 
@@ -85,6 +88,12 @@ def update_demonstration(ctx: Ctx, demonstration_id: str, body: DemonstrationCha
 def delete_demonstration(ctx: Ctx, demonstration_id: str, version: Version) -> None:
     """Put a demonstration away."""
     workflow.delete_demonstration(ctx, demonstration_id, version)
+
+
+@router.post("/demonstrations/{demonstration_id}/carry-over", status_code=201, response_model=Demonstration)
+def carry_over_demonstration(ctx: Ctx, demonstration_id: str, response: Response, _key: IdempotencyKey = None) -> Json:
+    """Take an order from before an edit over to the current regions, where they map one to one."""
+    return located(response, "demonstrations", workflow.carry_over_demonstration(ctx, demonstration_id))
 
 
 @router.post("/demonstrations/{demonstration_id}/restore", response_model=Demonstration)

@@ -39,6 +39,14 @@ class CoverageGain(Row):
     text: str
 
 
+class OlderDraft(Row):
+    """Clicks made before the regions were edited."""
+
+    placed: int
+    can_carry_over: bool
+    why: str
+
+
 class Draft(Row):
     """The sequence as far as it is clicked."""
 
@@ -48,6 +56,7 @@ class Draft(Row):
     can_undo: bool
     can_redo: bool
     complete: bool
+    older: OlderDraft | None
     coverage_gain: CoverageGain | None
 
 
@@ -85,6 +94,12 @@ def redo(ctx: Ctx, tool_id: str, _key: IdempotencyKey = None) -> Json:
 def clear(ctx: Ctx, tool_id: str, _key: IdempotencyKey = None) -> Json:
     """Empty the draft; undo brings it back."""
     return workflow.clear(ctx, tool_id)
+
+
+@router.post("/carry-over", response_model=Draft)
+def carry_over(ctx: Ctx, tool_id: str, _key: IdempotencyKey = None) -> Json:
+    """Go on with the clicks made before the regions were edited."""
+    return workflow.carry_over(ctx, tool_id)
 
 
 @router.post("/save", status_code=201, response_model=Demonstration)

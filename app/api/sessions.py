@@ -7,11 +7,25 @@ from pydantic import Field
 
 from app.api.dependencies import Body, Ctx, Json, RegionId, RegionOrder, Row, located
 from app.api.idempotency import ActionRoute, IdempotencyKey
+from app.api.segmentations import PointMm
 from app.workflow import sessions as workflow
 
 router = APIRouter(prefix="/sessions", tags=["sessions"], route_class=ActionRoute)
 
 Id = Annotated[str, Field(max_length=64)]
+
+
+class ClickedPoint(Body):
+    """A point on the part."""
+
+    point_mm: PointMm
+    region: RegionId | None = None
+
+
+Selection = Annotated[list[RegionId], Field(max_length=200, description="Selected regions.")]
+Points = Annotated[list[ClickedPoint], Field(max_length=100, description="Clicked points of a line, a plane or a piece.")]
+Level = Annotated[int, Field(ge=1, le=1000, description="1: the largest piece under the click, 2: the next smaller one.")]
+Pointing = Literal["select", "points", "piece"]
 
 
 class NewSession(Body):
@@ -23,7 +37,7 @@ class NewSession(Body):
 class Scene(Body):
     """What the view shows."""
 
-    mode: Literal["empty", "tool", "record", "sequence", "robot"]
+    mode: Literal["empty", "tool", "record", "sequence", "robot", "edit"]
     tool_id: Id | None = None
     sequence: RegionOrder | None = None
     step: Annotated[int, Field(ge=0, le=100_000, description="Regions after this step are undone; null: all done.")] | None = None
@@ -31,6 +45,24 @@ class Scene(Body):
     highlight: list[RegionId] | None = None
     playback_id: Id | None = None
     dark: bool | None = None
+    pointing: Pointing | None = None
+    selection: Selection | None = None
+    points: Points | None = None
+    level: Level | None = None
+    path: Literal["line", "plane"] | None = None
+    closed: bool | None = None
+
+
+class EditingChanges(Body):
+    """What changes in a view that edits regions; the rest stays. `hover` is only painted."""
+
+    pointing: Pointing | None = None
+    selection: Selection | None = None
+    points: Points | None = None
+    level: Level | None = None
+    path: Literal["line", "plane"] | None = None
+    closed: bool | None = None
+    hover: RegionId | None = None
 
 
 class PlaybackOrder(Body):
@@ -76,6 +108,12 @@ def get_session(ctx: Ctx, session_id: str) -> Json:
 def show(ctx: Ctx, session_id: str, body: Scene) -> Json:
     """Show something else."""
     return workflow.show(ctx, session_id, body.model_dump(exclude_unset=True))
+
+
+@router.patch("/{session_id}/scene", response_model=Session)
+def change_editing(ctx: Ctx, session_id: str, body: EditingChanges) -> Json:
+    """Change what is selected or pointed at in a view that edits regions."""
+    return workflow.change_editing(ctx, session_id, body.model_dump(exclude_unset=True))
 
 
 @router.post("/{session_id}/playback", response_model=Session)

@@ -9,9 +9,11 @@ from app.sequencing.problem import check_sequence
 from app.storage import emit
 from app.storage.identity import now
 from app.storage.tables import ACTIVE_RUN_STATES, Demonstration, Project, Run, RunDemonstration, Segmentation, ToolRow
+from app.workflow.carry_over import carried_over, standing_of
 from app.workflow.context import Context
 from app.workflow.lookup import check_version, found, present, ready_segmentation
 from app.workflow.project_rows import checked_name
+from app.workflow.values import Values
 
 Json = dict[str, Any]
 
@@ -28,14 +30,14 @@ def list_demonstrations(ctx: Context, project_id: str | None = None, tool_id: st
         if project_id is not None:
             present(session, Project, project_id)
             wanted = wanted.where(Demonstration.project_id == project_id)
-        return [demonstration_json(session, row) for row in session.exec(wanted.order_by(col(Demonstration.id))).all()]
+        return [demonstration_json(ctx.values, session, row) for row in session.exec(wanted.order_by(col(Demonstration.id))).all()]
 
     return ctx.store.read(query)
 
 
 def get_demonstration(ctx: Context, demonstration_id: str) -> Json:
     """One demonstration."""
-    return ctx.store.read(lambda session: demonstration_json(session, present(session, Demonstration, demonstration_id)))
+    return ctx.store.read(lambda session: demonstration_json(ctx.values, session, present(session, Demonstration, demonstration_id)))
 
 
 def create_demonstration(
@@ -51,7 +53,7 @@ def create_demonstration(
         row = present(session, ToolRow, tool_id)
         cut = ready_segmentation(session, row)
         order = list(check_sequence(sequence, cut.region_count))
-        return demonstration_json(session, add_demonstration(session, row, cut, order, source, name=name, author=author))
+        return demonstration_json(ctx.values, session, add_demonstration(session, row, cut, order, source, name=name, author=author))
 
     return ctx.store.write(change)
 
@@ -93,7 +95,7 @@ def update_demonstration(ctx: Context, demonstration_id: str, changes: Json, ver
         check_version(row, version)
         row.name = checked_name(changes.get("name", row.name))
         _count(session, row)
-        return demonstration_json(session, row)
+        return demonstration_json(ctx.values, session, row)
 
     return ctx.store.write(change)
 
@@ -129,12 +131,30 @@ def restore_demonstration(ctx: Context, demonstration_id: str) -> Json:
             if row.superseded_by is None:
                 _supersede_others(session, row)
             _count(session, row)
-        return demonstration_json(session, row)
+        return demonstration_json(ctx.values, session, row)
 
     return ctx.store.write(change)
 
 
-def demonstration_json(session: Session, row: Demonstration) -> Json:
+def carry_over_demonstration(ctx: Context, demonstration_id: str) -> Json:
+    """A new demonstration with the same order on the current regions; the older one is superseded.
+
+    Raises:
+        Conflict: The regions don't map one to one, or it is on the current ones.
+    """
+
+    def change(session: Session) -> Json:
+        row = present(session, Demonstration, demonstration_id)
+        tool, cut, order = carried_over(ctx, session, row)
+        times, author = row.click_times, row.author
+        fresh = add_demonstration(session, tool, cut, order, row.source, name=row.name, author=author, click_times=times)
+        return demonstration_json(ctx.values, session, fresh)
+
+    get_demonstration(ctx, demonstration_id)  # compares the cuts, if they weren't yet, beside the thread that writes
+    return ctx.store.write(change)
+
+
+def demonstration_json(values: Values, session: Session, row: Demonstration) -> Json:
     """The demonstration as REST shows it."""
     return {
         "id": row.id,
@@ -148,6 +168,7 @@ def demonstration_json(session: Session, row: Demonstration) -> Json:
         "superseded_by": row.superseded_by,
         "deleted": row.deleted_at is not None,
         "segmentation_id": row.segmentation_id,
+        **standing_of(values, session, row),
         "version": row.version,
         "created_at": row.created_at,
     }

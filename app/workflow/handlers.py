@@ -9,6 +9,6 @@ WARM_UP = ("app.sequencing.kernels.warm_up", "app.geometry.regions.warm_up")
 
 def register(jobs: Jobs, values: Values) -> None:
     """Tell the queue how each kind of job is done."""
-    jobs.register(import_job.KIND, import_job.handler(jobs.store))
+    jobs.register(import_job.KIND, import_job.handler(jobs.store, values))
     jobs.register(training_job.KIND, training_job.handler(values))
     jobs.register(playback_job.KIND, playback_job.handler(jobs.store, values))

@@ -2,6 +2,7 @@
 
 from typing import TypeVar
 
+from sqlalchemy.orm import aliased
 from sqlmodel import Session, SQLModel, col, func, select
 
 from app.errors import Conflict, NotFound, RunActive, StaleVersion
@@ -75,18 +76,28 @@ def ready_segmentation(session: Session, tool: ToolRow) -> Segmentation:
     return row
 
 
+def same_regions(session: Session, segmentation_id: str, cut: Segmentation) -> bool:
+    """Whether a sequence clicked on one segmentation holds on another as it is: locks, names and what is hidden don't matter."""
+    if segmentation_id == cut.id:
+        return True
+    row = session.get(Segmentation, segmentation_id)
+    return row is not None and row.tool_id == cut.tool_id and row.tool_sha == cut.tool_sha
+
+
 def standing(session: Session, project_id: str) -> list[Demonstration]:
-    """The demonstrations that count: newest of each tool, on its current cut, nothing deleted; in order of the tools."""
+    """The demonstrations that count: newest of each tool, on its current regions, nothing deleted; in order of the tools."""
+    now = aliased(Segmentation)
     wanted = (
         select(Demonstration)
         .join(ToolRow, col(ToolRow.id) == col(Demonstration.tool_id))
         .join(Segmentation, col(Segmentation.id) == col(Demonstration.segmentation_id))
+        .join(now, (col(now.tool_id) == col(Demonstration.tool_id)) & (col(now.tool_sha) == col(Segmentation.tool_sha)))
         .where(
             Demonstration.project_id == project_id,
             col(Demonstration.deleted_at).is_(None),
             col(Demonstration.superseded_by).is_(None),
             col(ToolRow.deleted_at).is_(None),
-            col(Segmentation.current),
+            col(now.current),
         )
     )
     newest = {row.tool_id: row for row in session.exec(wanted.order_by(col(Demonstration.id)))}
@@ -103,6 +114,16 @@ def run_training_on(session: Session, tool_id: str) -> Run | None:
     """An active run that uses the tool."""
     wanted = select(Run).join(RunDemonstration, col(RunDemonstration.run_id) == col(Run.id))
     return session.exec(wanted.where(RunDemonstration.tool_id == tool_id, col(Run.state).in_(ACTIVE_RUN_STATES))).first()
+
+
+def refuse_training_on(session: Session, tool: ToolRow) -> None:
+    """A tool stays as it is while a run learns from it.
+
+    Raises:
+        RunActive: There is such a run.
+    """
+    if run_training_on(session, tool.id):
+        raise RunActive(f"A run is learning from {tool.name}. Cancel the run first, or wait until it is done.")
 
 
 def open_query_count(session: Session, project_id: str) -> int:

@@ -9,6 +9,7 @@ from app.errors import IncompleteSequence
 from app.storage import emit
 from app.storage.identity import now
 from app.storage.tables import Draft, Project, Segmentation, ToolRow
+from app.workflow.carry_over import carry_over_draft, older_draft
 from app.workflow.context import Context
 from app.workflow.demonstrations import (
     add_demonstration,
@@ -20,11 +21,12 @@ from app.workflow.demonstrations import (
     restore_demonstration,
     update_demonstration,
 )
-from app.workflow.lookup import present, ready_segmentation
+from app.workflow.lookup import present, ready_segmentation, same_regions
 from app.workflow.reports import report_of
 from app.workflow.tools import check_region
 
 __all__ = [
+    "carry_over",
     "clear",
     "create_demonstration",
     "delete_demonstration",
@@ -125,6 +127,16 @@ def clear(ctx: Context, tool_id: str) -> Json:
     return _change(ctx, tool_id, step)
 
 
+def carry_over(ctx: Context, tool_id: str) -> Json:
+    """Go on with the clicks made before the regions were edited.
+
+    Raises:
+        Conflict: There are none, or a clicked region is no longer what it was.
+    """
+    carry_over_draft(ctx, tool_id)
+    return get_draft(ctx, tool_id)
+
+
 def save(ctx: Context, tool_id: str, name: str | None = None) -> Json:
     """Make a complete draft the tool's demonstration.
 
@@ -135,7 +147,7 @@ def save(ctx: Context, tool_id: str, name: str | None = None) -> Json:
     def change(session: Session) -> Json:
         row = present(session, ToolRow, tool_id)
         cut = ready_segmentation(session, row)
-        draft = _draft(session, cut)
+        draft = _draft(session, cut, change=True)
         missing = [r.name for a, r in enumerate(ctx.values.tool(session, cut).regions) if a not in draft.sequence]
         if missing:
             raise IncompleteSequence(
@@ -145,7 +157,7 @@ def save(ctx: Context, tool_id: str, name: str | None = None) -> Json:
         if draft in session:
             session.delete(draft)
         emit(session, "draft.changed", row.project_id, tool_id=tool_id)
-        return demonstration_json(session, shown)
+        return demonstration_json(ctx.values, session, shown)
 
     return ctx.store.write(change)
 
@@ -160,6 +172,7 @@ def draft_json(ctx: Context, session: Session, row: ToolRow, cut: Segmentation, 
         "can_undo": bool(draft.past),
         "can_redo": bool(draft.future),
         "complete": complete,
+        "older": older_draft(ctx.values, session, cut),
         "coverage_gain": _gain(ctx, session, row, draft) if complete else None,
     }
 
@@ -185,7 +198,7 @@ def _change(ctx: Context, tool_id: str, step: Any) -> Json:
     def change(session: Session) -> None:
         row = present(session, ToolRow, tool_id)
         cut = ready_segmentation(session, row)
-        draft = _draft(session, cut)
+        draft = _draft(session, cut, change=True)
         step(session, row, cut, draft)
         draft.updated_at = now()
         session.add(draft)
@@ -195,14 +208,15 @@ def _change(ctx: Context, tool_id: str, step: Any) -> Json:
     return get_draft(ctx, tool_id)
 
 
-def _draft(session: Session, cut: Segmentation) -> Draft:
-    """The draft on this cut; a draft on an earlier cut counts for nothing."""
+def _draft(session: Session, cut: Segmentation, *, change: bool = False) -> Draft:
+    """The draft on these regions; one on earlier regions counts for nothing, and a change takes its place."""
     draft = session.get(Draft, cut.tool_id)
-    if draft is None:
-        draft = Draft(tool_id=cut.tool_id, segmentation_id=cut.id, sequence=[], click_times=[], past=[], future=[])
-    elif draft.segmentation_id != cut.id:
-        draft.segmentation_id = cut.id
-        draft.sequence, draft.click_times, draft.past, draft.future = [], [], [], []
+    if draft is not None and same_regions(session, draft.segmentation_id, cut):
+        return draft
+    if draft is None or not change:
+        return Draft(tool_id=cut.tool_id, segmentation_id=cut.id, sequence=[], click_times=[], past=[], future=[])
+    draft.segmentation_id = cut.id
+    draft.sequence, draft.click_times, draft.past, draft.future = [], [], [], []
     return draft
 
 

@@ -8,8 +8,9 @@ from sqlmodel import Session
 from app.errors import InvalidInput, NotFound
 from app.storage import emit
 from app.storage.tables import PlaybackRow, Project, ToolRow, ViewSession
-from app.workflow import record
+from app.workflow import editing_views, record, segmentations
 from app.workflow.context import Context
+from app.workflow.editing_views import editing_scene, pick_point, pick_region, tell_editing
 from app.workflow.lookup import found, present
 
 Json = dict[str, Any]
@@ -60,35 +61,60 @@ def show(ctx: Context, session_id: str, scene: Json) -> Json:
         _check_scene(session, row.project_id, scene)
         if scene.get("playback_id") != row.scene.get("playback_id"):
             row.playback = AT_START
-        row.scene = {name: scene[name] for name in FIELDS if name in scene}
+        if scene["mode"] == "edit":
+            row.scene = editing_scene(session, row.scene, scene)
+            tell_editing(ctx.values, session, row)
+        else:
+            row.scene = {name: scene[name] for name in FIELDS if name in scene}
+            emit(session, "scene.changed", row.project_id, session_id=session_id)
         session.add(row)
-        emit(session, "scene.changed", row.project_id, session_id=session_id)
         return session_json(session, row)
 
     return ctx.store.write(change)
 
 
-def pick_in_view(ctx: Context, session_id: str, region: int) -> None:
-    """A click on a region: into the draft while recording, otherwise told to the page."""
+def change_editing(ctx: Context, session_id: str, changes: Json) -> Json:
+    """Change what is selected or pointed at in a view that edits regions; `hover` is told, not stored."""
+    if set(changes) != {"hover"}:
+        editing_views.change_editing(ctx, session_id, changes)
+    if "hover" in changes:
+        row = get_session(ctx, session_id)
+        told = {"session_id": session_id, "region": changes["hover"]}
+        ctx.store.write(lambda session: emit(session, "session.hovered", row["project_id"], **told))
+    return get_session(ctx, session_id)
+
+
+def pick_in_view(ctx: Context, session_id: str, region: int | None, point_mm: list[float] | None = None, *, modifier: bool = False) -> None:
+    """A click on a region or beside them (None): into the draft while recording, into what is being edited, otherwise told to the page."""
     session_row = get_session(ctx, session_id)
     scene = session_row["scene"]
-    if scene["mode"] == "record":
+    if scene["mode"] == "edit" and scene["pointing"] != "select" and point_mm is not None:
+        pick_point(ctx, session_id, point_mm, region)
+    elif scene["mode"] == "edit":
+        pick_region(ctx, session_id, region, toggle=modifier)
+    elif region is None:
+        return
+    elif scene["mode"] == "record":
         record.pick(ctx, scene["tool_id"], region)
     else:
         ctx.store.write(lambda session: emit(session, "session.picked", session_row["project_id"], session_id=session_id, region=region))
 
 
 def command_in_view(ctx: Context, session_id: str, command: str) -> None:
-    """Undo, redo or clear the draft that a view records.
+    """Undo or redo in what a view records or edits, or clear what it records.
 
     Raises:
-        InvalidInput: The view is not recording, or there is no such command.
+        InvalidInput: The view does neither, or there is no such command.
     """
-    actions = {"undo": record.undo, "redo": record.redo, "clear": record.clear}
+    actions = {
+        "record": {"undo": record.undo, "redo": record.redo, "clear": record.clear},
+        "edit": {"undo": segmentations.undo, "redo": segmentations.redo},
+    }
     scene = get_session(ctx, session_id)["scene"]
-    if command not in actions or scene["mode"] != "record":
-        raise InvalidInput("Undo, redo and clear are for a view that records an order.")
-    actions[command](ctx, scene["tool_id"])
+    known = actions.get(scene["mode"], {})
+    if command not in known:
+        raise InvalidInput("Undo and redo are for a view that records an order or edits regions; clear is for recording.")
+    known[command](ctx, scene["tool_id"])
 
 
 def control_playback(ctx: Context, session_id: str, action: str, time: float | None = None, speed: float | None = None) -> Json:
@@ -141,8 +167,8 @@ def _duration(session: Session, scene: Json) -> float | None:
 
 def _check_scene(session: Session, project_id: str, scene: Json) -> None:
     mode, tool_id, playback_id = scene.get("mode"), scene.get("tool_id"), scene.get("playback_id")
-    if mode not in ("empty", "tool", "record", "sequence", "robot"):
-        raise InvalidInput(f"A view shows empty, tool, record, sequence or robot, not {mode!r}.")
+    if mode not in ("empty", "tool", "record", "sequence", "robot", "edit"):
+        raise InvalidInput(f"A view shows empty, tool, record, sequence, robot or edit, not {mode!r}.")
     if mode != "empty" and tool_id is None:
         raise InvalidInput(f"A view in the mode {mode} needs a tool_id.")
     if tool_id is not None and present(session, ToolRow, tool_id).project_id != project_id:

@@ -9,7 +9,7 @@ from app.storage import Store, emit
 from app.storage.artifacts import keep
 from app.storage.conversions import MEDIA_TYPE
 from app.storage.tables import Demonstration, Segmentation, ToolRow
-from app.workflow.lookup import current_segmentation
+from app.workflow.lookup import current_segmentation, run_training_on
 
 Json = dict[str, Any]
 
@@ -36,6 +36,7 @@ def tool_json(session: Session, row: ToolRow) -> Json:
         "demonstration_id": shown.id if shown else None,
         "feature_set": cut.feature_set if cut else None,
         "segmentation_id": cut.id if cut else None,
+        "edit": edit_json(session, row, cut),
         "job": job_json(unfinished_job(session, row.id)),
         "report": row.report,
         "error": row.error,
@@ -44,10 +45,48 @@ def tool_json(session: Session, row: ToolRow) -> Json:
     }
 
 
+def edit_json(session: Session, row: ToolRow, cut: Segmentation | None) -> Json:
+    """Whether the regions can be edited, what undo and redo would do, and what is locked or hidden."""
+    why_not = None
+    if cut is None or unfinished_job(session, row.id):
+        why_not = f"{row.name} is not read in yet." if cut is None else f"{row.name} is being cut."
+    elif row.kind == "table":
+        why_not = f"{row.name} comes from a region table, which says what its regions are. Change the table and import it again."
+    elif run_training_on(session, row.id):
+        why_not = f"A run is learning from {row.name}. Cancel the run first, or wait until it is done."
+    ahead = session.get(Segmentation, cut.redo_id) if cut and cut.redo_id else None
+    return {
+        "can_undo": bool(cut and cut.parent_id),
+        "can_redo": ahead is not None,
+        "undo": cut.words if cut and cut.parent_id else None,
+        "redo": ahead.words if ahead else None,
+        "locked": cut.locked if cut else [],
+        "hidden": cut.hidden if cut else [],
+        "editable": why_not is None,
+        "why_not": why_not,
+        "step": steps_before(session, cut) if cut else 0,
+    }
+
+
+def steps_before(session: Session, cut: Segmentation) -> int:
+    """How many edits led to a cut."""
+    count = 0
+    while cut.parent_id is not None and (above := session.get(Segmentation, cut.parent_id)):
+        cut, count = above, count + 1
+    return count
+
+
 def tool_demonstration(session: Session, cut: Segmentation) -> Demonstration | None:
     """The demonstration that counts for a tool's current cut."""
-    wanted = select(Demonstration).where(
-        Demonstration.segmentation_id == cut.id, col(Demonstration.deleted_at).is_(None), col(Demonstration.superseded_by).is_(None)
+    wanted = (
+        select(Demonstration)
+        .join(Segmentation, col(Segmentation.id) == col(Demonstration.segmentation_id))
+        .where(
+            Segmentation.tool_id == cut.tool_id,
+            Segmentation.tool_sha == cut.tool_sha,
+            col(Demonstration.deleted_at).is_(None),
+            col(Demonstration.superseded_by).is_(None),
+        )
     )
     return session.exec(wanted.order_by(col(Demonstration.id).desc())).first()
 

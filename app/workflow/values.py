@@ -6,16 +6,21 @@ from collections.abc import Callable, Hashable
 from dataclasses import replace
 from typing import Any
 
-from sqlmodel import Session, select
+from sqlmodel import Session, col, select
 
+from app.geometry.carry_over import RegionMap, map_regions
+from app.geometry.importing import ImportedPart
+from app.geometry.merge_tree import MergeTree
+from app.geometry.pieces import tree_for
 from app.geometry.tool import Tool
 from app.sequencing.features import FEATURE_SETS, Interaction
 from app.sequencing.problem import SequencingProblem
 from app.storage import Store
-from app.storage.conversions import tool_from_bytes
+from app.storage.conversions import part_from_bytes, tool_from_bytes
 from app.storage.tables import RegionName, Segmentation
 
 KEPT_TOOLS, KEPT_PROBLEMS, KEPT_REPORTS = 64, 24, 32
+KEPT_TREES, KEPT_MAPS = 8, 256
 
 
 class Kept:
@@ -44,14 +49,44 @@ class Values:
         self._tools = Kept(KEPT_TOOLS)
         self._problems = Kept(KEPT_PROBLEMS)
         self.reports = Kept(KEPT_REPORTS)
+        self._trees = Kept(KEPT_TREES)
+        self._parts = Kept(KEPT_TREES)
+        self._maps = Kept(KEPT_MAPS)
 
     def tool(self, session: Session, segmentation: Segmentation) -> Tool:
         """The tool with the names people gave its regions."""
-        tool: Tool = self._tools.get(segmentation.id, lambda: tool_from_bytes(self._store.artifacts.get(segmentation.tool_sha)))
-        given = {row.region: row.name for row in session.exec(select(RegionName).where(RegionName.segmentation_id == segmentation.id))}
+        tool: Tool = self._tools.get(segmentation.tool_sha, lambda: tool_from_bytes(self._store.artifacts.get(segmentation.tool_sha)))
+        named = self._named_by(session, segmentation)
+        given = {row.region: row.name for row in session.exec(select(RegionName).where(RegionName.segmentation_id == named))}
         if not given:
             return tool
         return replace(tool, regions=tuple(replace(r, name=given.get(i, r.name)) for i, r in enumerate(tool.regions)))
+
+    def _named_by(self, session: Session, segmentation: Segmentation) -> str:
+        """The segmentation whose names count: the current one while it has the same regions."""
+        wanted = select(Segmentation.id).where(
+            Segmentation.tool_id == segmentation.tool_id, Segmentation.tool_sha == segmentation.tool_sha, col(Segmentation.current)
+        )
+        return session.exec(wanted).first() or segmentation.id
+
+    def tree(self, tool: Tool, tool_sha: str, part_sha: str | None, tree_sha: str | None) -> MergeTree:
+        """The merge tree on the triangles of a cut: the kept one of its part, or one made now."""
+        return self._trees.get((tool_sha, part_sha), lambda: tree_for(tool, self.part(part_sha), self.part_tree(tree_sha)))
+
+    def part_tree(self, tree_sha: str | None) -> MergeTree | None:
+        """The kept merge tree of a part; None for parts read in before it was kept, and tools without a part."""
+        if tree_sha is None:
+            return None
+        return self._trees.get(tree_sha, lambda: MergeTree.from_bytes(self._store.artifacts.get(tree_sha)))
+
+    def part(self, part_sha: str | None) -> ImportedPart | None:
+        """A cleaned part."""
+        return None if part_sha is None else self._parts.get(part_sha, lambda: part_from_bytes(self._store.artifacts.get(part_sha)))
+
+    def region_map(self, session: Session, old: Segmentation, new: Segmentation) -> RegionMap:
+        """How the regions of an older cut lie in a newer one."""
+        tools = self.tool(session, old), self.tool(session, new)
+        return self._maps.get((old.tool_sha, new.tool_sha), lambda: map_regions(*tools))
 
     def problem(self, session: Session, segmentation: Segmentation, interactions: tuple[Interaction, ...]) -> SequencingProblem:
         """The tool's sequencing problem with its tables, once built."""

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from app.errors import IncompleteSequence, InvalidInput, NotFound, StaleVersion
-from app.workflow import coverage, record, sessions, tools
+from app.workflow import coverage, record, segmentations, sessions, tools
 from app.workflow.context import Context
 from tests.workflow.conftest import project_of
 
@@ -79,10 +79,10 @@ def test_deleting_can_be_undone(sample: Context, tool: dict[str, Any]) -> None:
 
 
 def test_a_region_keeps_its_given_name(sample: Context, tool: dict[str, Any]) -> None:
-    assert tools.rename_region(sample, tool["id"], 0, " Lip ")["name"] == "Lip"
+    assert segmentations.rename_region(sample, tool["id"], 0, " Lip ")["name"] == "Lip"
     assert tools.tool_value(sample, tool["id"]).regions[0].name == "Lip"
     with pytest.raises(InvalidInput, match="name of its own"):
-        tools.rename_region(sample, tool["id"], 1, "Lip")
+        segmentations.rename_region(sample, tool["id"], 1, "Lip")
 
 
 def test_a_click_in_a_view_that_shows_is_told_to_the_page(sample: Context, tool: dict[str, Any]) -> None:

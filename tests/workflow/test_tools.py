@@ -10,7 +10,7 @@ import trimesh
 
 from app.errors import Conflict, InvalidInput, NotFound, StaleVersion, UnreadableMesh
 from app.geometry.moulds import sample_moulds
-from app.workflow import projects, record, tools
+from app.workflow import projects, record, segmentations, tools
 from app.workflow.context import Context
 from tests.workflow.conftest import project_of
 
@@ -35,7 +35,7 @@ def test_a_file_without_units_is_asked_about_and_read_once_answered(ctx: Context
     assert tool["questions"]["units"]["guess"] == "mm"
     assert tool["questions"]["up"]["guess"] == "+z"
     with pytest.raises(Conflict, match="not read in yet"):
-        tools.list_regions(ctx, tool["id"])
+        segmentations.list_regions(ctx, tool["id"])
     assert projects.get_project(ctx, project)["next_step"]["title"] == "Set up Bend"
     half = tools.answer_tool(ctx, tool["id"], {"units": "mm"}, tool["version"])
     assert (half["state"], half["questions"]["units"]) == ("asking", None)
@@ -47,7 +47,7 @@ def test_a_file_without_units_is_asked_about_and_read_once_answered(ctx: Context
     assert ctx.jobs.wait_idle(60)
     ready = tools.get_tool(ctx, tool["id"])
     assert (ready["state"], ready["feature_set"], ready["job"]) == ("ready", "clean", None)
-    regions = tools.list_regions(ctx, tool["id"])
+    regions = segmentations.list_regions(ctx, tool["id"])
     assert len(regions) == ready["region_count"] >= 2
     assert all(b in range(len(regions)) and r["id"] in regions[b]["neighbours"] for r in regions for b in r["neighbours"])
     scene = trimesh.load(io.BytesIO(tools.mesh_glb(ctx, tool["id"])), file_type="glb")

@@ -1,0 +1,111 @@
+"""Cut a tool anew by parameters, around regions that a person has locked."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from app.geometry.carry_over import map_regions
+from app.geometry.cleaning import areas, face_pairs
+from app.geometry.editing import shared_length
+from app.geometry.importing import ImportedPart
+from app.geometry.merge_tree import MergeTree
+from app.geometry.pieces import tree_for
+from app.geometry.regions import measure, measure_labelled
+from app.geometry.segmentation import Report, SegmentationParameters, ignore, segment
+from app.geometry.splitting import connected
+from app.geometry.tool import Tool, region_letters
+
+LETTERS = 702  # A to ZZ: names nobody gave
+SCRAP = 0.01  # share of the working surface below which what is left of a new region beside a locked one goes to a neighbour
+
+
+def recut(
+    part: ImportedPart,
+    parameters: SegmentationParameters,
+    tree: MergeTree,
+    before: Tool | None = None,
+    locked: Sequence[int] = (),
+    report: Report = ignore,
+) -> tuple[Tool, tuple[int, ...]]:
+    """Cut a part; with its kept tree that takes no time.
+
+    Args:
+        part: The part.
+        parameters: How finely to cut.
+        tree: Its merge tree.
+        before: The tool as it was cut so far; regions that stay the same keep the names people gave them.
+        locked: Regions of `before` that stay.
+        report: Told the progress.
+
+    Returns:
+        The tool, and the numbers the locked regions have in it.
+    """
+    if before is not None and locked:
+        return recut_around(before, locked, part, parameters, tree_for(before, part, tree))
+    cut = segment(part, parameters, report, tree)
+    tool = measure(cut.part.mesh, cut.labels)
+    return (tool if before is None else _with_given_names(before, tool)), ()
+
+
+def _with_given_names(before: Tool, tool: Tool) -> Tool:
+    """Names that are no letters stay with regions that stay."""
+    letters = set(region_letters(LETTERS))
+    if all(r.name in letters for r in before.regions):
+        return tool
+    new_of = map_regions(before, tool).new_of
+    given = {int(new_of[a]): r.name for a, r in enumerate(before.regions) if r.name not in letters and new_of[a] >= 0}
+    return replace(tool, regions=tuple(replace(r, name=given.get(i, r.name)) for i, r in enumerate(tool.regions)))
+
+
+def recut_around(
+    tool: Tool, locked: Sequence[int], part: ImportedPart, parameters: SegmentationParameters, tree: MergeTree
+) -> tuple[Tool, tuple[int, ...]]:
+    """Cut everything but the locked regions anew; they keep their names.
+
+    Args:
+        tool: The tool as it is.
+        locked: Regions that stay.
+        part: The part it was made from, for its CAD faces.
+        parameters: How finely to cut the rest.
+        tree: The merge tree on the tool's triangles.
+
+    Returns:
+        The tool, and the numbers the locked regions have in it: the first ones.
+    """
+    here = replace(part, mesh=tool.mesh, cad_face=np.full(len(tool.mesh.faces), -1, np.int32))
+    cut = segment(here, parameters, tree=tree)
+    before = tool.labels[cut.source]
+    held = np.isin(before, list(locked))
+    labels = np.where(cut.labels >= 0, cut.labels + len(locked), -1).astype(np.int64)
+    labels[held] = np.searchsorted(sorted(locked), before[held])
+    labels = _without_scraps(cut.part, labels, len(locked))
+    present = np.unique(labels[labels >= 0])
+    compact = np.where(labels >= 0, np.searchsorted(present, labels), -1).astype(np.int32)
+    kept = [tool.regions[a].name for a in sorted(locked)]
+    free = [name for name in region_letters(len(present) + len(kept)) if name not in kept]
+    names = [*kept, *free[: len(present) - len(kept)]]
+    return measure_labelled(cut.part.mesh, compact, names), tuple(range(len(kept)))
+
+
+def _without_scraps(part: ImportedPart, labels: np.ndarray, locked: int) -> np.ndarray:
+    """Every label connected; small leftovers go to the neighbour, not a locked one, they share most border with."""
+    pairs = face_pairs(part.mesh.faces)
+    area = areas(part.mesh.vertices, part.mesh.faces.astype(np.int64))
+    piece = connected(labels, pairs)
+    owner = np.full(int(piece.max()) + 1, -1, np.int64)
+    owner[piece] = labels
+    least = SCRAP * area[labels >= 0].sum()
+    length = shared_length(part.mesh, pairs[:, 0], pairs[:, 1])
+    while True:
+        size = np.bincount(piece, weights=area, minlength=len(owner))
+        small = [p for p in np.argsort(size).tolist() if 0 < size[p] < least and owner[p] >= locked]
+        for scrap in small:
+            both = piece[pairs]
+            beyond = both.sum(axis=1) - scrap
+            near = ((both == scrap).sum(axis=1) == 1) & (owner[np.clip(beyond, 0, len(owner) - 1)] >= locked)
+            if near.any():
+                piece = np.where(piece == scrap, int(np.argmax(np.bincount(beyond[near], weights=length[near]))), piece)
+                break
+        else:
+            return np.where(owner[piece] >= locked, locked + piece, owner[piece])

@@ -1,0 +1,345 @@
+"""Editing a tool's regions: each edit is a new segmentation, undo and redo move the pointer to the current one."""
+
+import csv
+import io
+from functools import partial
+from typing import Any
+
+import numpy as np
+from sqlmodel import Session, col, func, select
+
+from app.errors import Conflict, InvalidInput, StaleVersion
+from app.geometry.borders import FREE, find_borders
+from app.geometry.recutting import recut
+from app.geometry.segmentation import SegmentationParameters
+from app.geometry.tool import Tool
+from app.jobs.rows import unfinished_job
+from app.sequencing.features import feature_set_for
+from app.storage import emit
+from app.storage.conversions import tool_to_bytes
+from app.storage.tables import Demonstration, RegionName, Segmentation, ToolRow
+from app.workflow.context import Context
+from app.workflow.editing_views import follow_edit, follow_jump
+from app.workflow.edits import SAME_REGIONS, After, Before, apply
+from app.workflow.lookup import found, present, ready_segmentation, refuse_training_on
+from app.workflow.tool_rows import add_cut, tool_json, touch_tool
+from app.workflow.tools import region_json
+
+Json = dict[str, Any]
+
+CSV_COLUMNS = (
+    "id", "name", "description", "kind", "area_mm2", "curvature_per_m", "height", "centroid_x_mm", "centroid_y_mm", "centroid_z_mm",
+    "normal_x", "normal_y", "normal_z", "perimeter_mm", "free_border_mm", "neighbours", "locked", "hidden",
+)  # fmt: skip
+
+
+def edit_tool(ctx: Context, tool_id: str, edit: Json, segmentation_id: str | None = None) -> Json:
+    """Edit the regions; computed beside the database, stored when nothing else has changed them meanwhile.
+
+    Raises:
+        InvalidInput: What can't be done, in a sentence.
+        Conflict: The tool is being read in or trained on, or its regions were changed meanwhile.
+    """
+    before_id, before = ctx.store.read(lambda session: _before(ctx, session, tool_id, edit["kind"], segmentation_id))
+    after = apply(before, edit)
+    shaped = edit["kind"] not in SAME_REGIONS
+    content = tool_to_bytes(after.tool) if shaped else b""
+
+    def change(session: Session) -> Json:
+        row, parent = _editable(session, tool_id, edit["kind"])
+        _check_unchanged(row, parent, before_id)
+        if shaped:
+            features = feature_set_for(after.tool.graph).name
+            cut = add_cut(session, ctx.store, row, content, after.tool.n, features, {"edit": edit})
+        else:
+            cut = _same_regions(session, parent, after)
+        _join_history(session, parent, cut, edit["kind"], after)
+        follow_edit(ctx.values, session, row, after)
+        return _tell(session, row, shaped)
+
+    return ctx.store.write(change)
+
+
+def rename_region(ctx: Context, tool_id: str, region: int, name: str) -> Json:
+    """Give a region another name.
+
+    Raises:
+        InvalidInput: No such region, an empty name, or one that another region has.
+    """
+    edit_tool(ctx, tool_id, {"kind": "rename", "region": region, "name": name})
+    return list_regions(ctx, tool_id)[region]
+
+
+def recut_tool(ctx: Context, tool_id: str, parameters: Json, segmentation_id: str | None = None) -> Json:
+    """Cut the tool anew at once, from the kept merge tree; locked regions stay.
+
+    Raises:
+        Conflict: No merge tree is kept; cut it as background work instead.
+    """
+    known = SegmentationParameters(**parameters)
+
+    def value(session: Session) -> tuple[str, Before, Any, Any]:
+        before_id, before = _before(ctx, session, tool_id, "cut", segmentation_id)
+        row = present(session, ToolRow, tool_id)
+        part, tree = ctx.values.part(row.part_sha), ctx.values.part_tree(row.tree_sha)
+        if part is None:
+            raise InvalidInput(f"{row.name} comes with its regions; only tools made from a CAD file can be cut anew.")
+        if tree is None:
+            raise Conflict(f"{row.name} was read in before its merges were kept. Cut it once in the background, then this works at once.")
+        return before_id, before, part, tree
+
+    before_id, before, part, tree = ctx.store.read(value)
+    tool, held = recut(part, known, tree, before.tool, before.locked)
+    kept = tuple(before.locked[held.index(a)] if a in held else -1 for a in range(tool.n))
+    hidden = tuple(a for a, old in enumerate(kept) if old in before.hidden)
+    after = After(tool, kept, tuple(held), hidden, f"Cut into {tool.n} regions")
+    content = tool_to_bytes(tool)
+
+    def change(session: Session) -> Json:
+        row, parent = _editable(session, tool_id, "cut")
+        _check_unchanged(row, parent, before_id)
+        cut = add_cut(session, ctx.store, row, content, tool.n, feature_set_for(tool.graph).name, vars(known))
+        _join_history(session, parent, cut, "cut", after)
+        follow_edit(ctx.values, session, row, after)
+        return _tell(session, row, shaped=True)
+
+    return ctx.store.write(change)
+
+
+def undo(ctx: Context, tool_id: str) -> Json:
+    """Go back one edit.
+
+    Raises:
+        Conflict: There is none to undo.
+    """
+
+    def target(session: Session, row: ToolRow, cut: Segmentation) -> Segmentation:
+        if cut.parent_id is None:
+            raise Conflict(f"Nothing to undo: {row.name} is as it was read in.")
+        return found(session, Segmentation, cut.parent_id, "segmentation")
+
+    return _jump(ctx, tool_id, target, remember=True)
+
+
+def redo(ctx: Context, tool_id: str) -> Json:
+    """Go forward to the edit last undone.
+
+    Raises:
+        Conflict: There is none.
+    """
+
+    def target(session: Session, row: ToolRow, cut: Segmentation) -> Segmentation:
+        if cut.redo_id is None:
+            raise Conflict(f"Nothing to redo: the last edit of {row.name} is shown.")
+        return found(session, Segmentation, cut.redo_id, "segmentation")
+
+    return _jump(ctx, tool_id, target, remember=False)
+
+
+def restore(ctx: Context, tool_id: str, segmentation_id: str) -> Json:
+    """Go to any step of the history."""
+
+    def target(session: Session, row: ToolRow, _cut: Segmentation) -> Segmentation:
+        row_wanted = found(session, Segmentation, segmentation_id, "segmentation")
+        if row_wanted.tool_id != row.id or row_wanted.id not in {s.id for s in _steps(session, row)}:
+            raise Conflict(f"This segmentation doesn't belong to what {row.name} is now, so it can't be gone back to.")
+        return row_wanted
+
+    return _jump(ctx, tool_id, target, remember=False)
+
+
+def history(ctx: Context, tool_id: str) -> Json:
+    """All steps, oldest first."""
+
+    def query(session: Session) -> Json:
+        row = present(session, ToolRow, tool_id)
+        cut = ready_segmentation(session, row)
+        steps = _steps(session, row)
+        done, ahead = _line(session, cut)
+        counted = select(Demonstration.segmentation_id, func.count()).where(col(Demonstration.deleted_at).is_(None))
+        shown = dict(session.exec(counted.where(Demonstration.tool_id == row.id).group_by(Demonstration.segmentation_id)).all())
+        items = [
+            {
+                "id": step.id,
+                "words": step.words,
+                "kind": step.kind,
+                "created_at": step.created_at,
+                "region_count": step.region_count,
+                "current": step.id == cut.id,
+                "undone": step.id in ahead,
+                "abandoned": step.id not in done and step.id not in ahead,
+                "parent_id": step.parent_id,
+                "same_regions_as": next((s.id for s in steps if s.tool_sha == step.tool_sha and s.id < step.id), None),
+                "demonstrations": shown.get(step.id, 0),
+            }
+            for step in steps
+        ]
+        return {"items": items, "next": None, "can_undo": cut.parent_id is not None, "can_redo": cut.redo_id is not None}
+
+    return ctx.store.read(query)
+
+
+def list_regions(ctx: Context, tool_id: str) -> list[Json]:
+    """The regions with their attributes and marks; the position is the region id."""
+
+    def query(session: Session) -> tuple[Tool, Segmentation]:
+        cut = ready_segmentation(session, present(session, ToolRow, tool_id))
+        return ctx.values.tool(session, cut), cut
+
+    tool, cut = ctx.store.read(query)
+    perimeter, free = _borders(tool)
+    return [
+        {
+            **region_json(tool, a),
+            "perimeter_mm": perimeter[a],
+            "free_border_mm": free[a],
+            "locked": a in cut.locked,
+            "hidden": a in cut.hidden,
+        }
+        for a in range(tool.n)
+    ]
+
+
+def regions_csv(ctx: Context, tool_id: str) -> str:
+    """The regions as a table with units in its header."""
+    rows = list_regions(ctx, tool_id)
+    names = [row["name"] for row in rows]
+    file = io.StringIO()
+    writer = csv.writer(file, lineterminator="\r\n")
+    writer.writerow(CSV_COLUMNS)
+    for row in rows:
+        shape = [f"{v:.6g}" for v in (row["area_mm2"], row["curvature_per_m"], row["height"], *row["centroid_mm"], *row["normal"])]
+        border = ["" if v is None else f"{v:.6g}" for v in (row["perimeter_mm"], row["free_border_mm"])]
+        words = [_harmless(row[key]) for key in ("name", "description", "kind")]
+        beside = " ".join(_harmless(names[b]) for b in row["neighbours"])
+        writer.writerow([row["id"], *words, *shape, *border, beside, str(row["locked"]).lower(), str(row["hidden"]).lower()])
+    return file.getvalue()
+
+
+def _harmless(text: str) -> str:
+    """A spreadsheet must not take a name for a formula."""
+    return f"'{text}" if text[:1] in ("=", "+", "-", "@") else text
+
+
+def _borders(tool: Tool) -> tuple[list[float | None], list[float | None]]:
+    """Whole and free border of each region, mm; None for tools from a table, whose lengths are in the table's own units."""
+    if tool.graph.source != "mesh":
+        return [None] * tool.n, [None] * tool.n
+    borders = find_borders(tool.mesh, tool.labels)
+    free = borders.beyond == FREE
+    open_length = np.bincount(borders.region[free], weights=borders.length[free], minlength=tool.n)
+    return (borders.perimeter(tool.n) * 1e3).tolist(), (open_length * 1e3).tolist()
+
+
+def _before(ctx: Context, session: Session, tool_id: str, kind: str, segmentation_id: str | None) -> tuple[str, Before]:
+    row, cut = _editable(session, tool_id, kind)
+    if segmentation_id is not None:
+        _check_unchanged(row, cut, segmentation_id)
+    tool = ctx.values.tool(session, cut)
+    tree = partial(ctx.values.tree, tool, cut.tool_sha, row.part_sha, row.tree_sha)
+    return cut.id, Before(tool, tuple(cut.locked), tuple(cut.hidden), tree)
+
+
+def _editable(session: Session, tool_id: str, kind: str) -> tuple[ToolRow, Segmentation]:
+    """The tool and its current cut, when it may be edited now."""
+    row = present(session, ToolRow, tool_id)
+    cut = ready_segmentation(session, row)
+    if row.kind == "table" and kind not in SAME_REGIONS:
+        raise InvalidInput(f"{row.name} comes from a region table, which says what its regions are. Change the table and import it again.")
+    if unfinished_job(session, row.id):
+        raise Conflict(f"{row.name} is being cut. Wait until that is done.")
+    if kind not in SAME_REGIONS:
+        refuse_training_on(session, row)
+    return row, cut
+
+
+def _check_unchanged(row: ToolRow, cut: Segmentation, expected: str) -> None:
+    if cut.id != expected:
+        raise StaleVersion(f"The regions of {row.name} were changed meanwhile. Look at them again, then repeat the edit.")
+
+
+def _same_regions(session: Session, parent: Segmentation, after: After) -> Segmentation:
+    """A new current segmentation with the regions of the one before; only marks and names differ."""
+    parent.current = False
+    session.add(parent)
+    session.flush()
+    cut = Segmentation(
+        tool_id=parent.tool_id,
+        params=parent.params,
+        tool_sha=parent.tool_sha,
+        region_count=parent.region_count,
+        feature_set=parent.feature_set,
+    )
+    session.add(cut)
+    session.flush()
+    for region, its in enumerate(after.tool.regions):
+        session.add(RegionName(segmentation_id=cut.id, region=region, name=its.name))
+    return cut
+
+
+def _join_history(session: Session, parent: Segmentation, cut: Segmentation, kind: str, after: After) -> None:
+    cut.parent_id, cut.kind, cut.words = parent.id, kind, after.words
+    cut.locked, cut.hidden = list(after.locked), list(after.hidden)
+    parent.redo_id = cut.id
+    session.add(cut)
+    session.add(parent)
+    session.flush()
+
+
+def _tell(session: Session, row: ToolRow, shaped: bool) -> Json:
+    touch_tool(session, row)
+    emit(session, "draft.changed", row.project_id, tool_id=row.id)
+    if shaped:
+        emit(session, "coverage.changed", row.project_id)
+    return tool_json(session, row)
+
+
+def _jump(ctx: Context, tool_id: str, target: Any, *, remember: bool) -> Json:
+    """Make another step of the history the current one."""
+
+    def change(session: Session) -> Json:
+        row = present(session, ToolRow, tool_id)
+        cut = ready_segmentation(session, row)
+        wanted: Segmentation = target(session, row, cut)
+        shaped = wanted.tool_sha != cut.tool_sha
+        _editable(session, tool_id, "cut" if shaped else "lock")
+        cut.current = False
+        session.add(cut)
+        session.flush()
+        if remember:
+            wanted.redo_id = cut.id
+        wanted.current = True
+        session.add(wanted)
+        session.flush()
+        follow_jump(ctx.values, session, row, shaped)
+        return _tell(session, row, shaped)
+
+    return ctx.store.write(change)
+
+
+def _steps(session: Session, row: ToolRow) -> list[Segmentation]:
+    """Every step that hangs together with the current one, oldest first."""
+    rows = list(session.exec(select(Segmentation).where(Segmentation.tool_id == row.id).order_by(col(Segmentation.id))))
+    parent = {s.id: s.parent_id for s in rows}
+
+    def root(key: str) -> str:
+        while (above := parent[key]) is not None:
+            key = above
+        return key
+
+    here = next(s.id for s in rows if s.current)
+    return [s for s in rows if root(s.id) == root(here)]
+
+
+def _line(session: Session, cut: Segmentation) -> tuple[set[str], set[str]]:
+    """Ids of the steps that lead to the current one, and of those a redo would go through."""
+    done, ahead = {cut.id}, set[str]()
+    at = cut
+    while at.parent_id is not None:
+        at = found(session, Segmentation, at.parent_id, "segmentation")
+        done.add(at.id)
+    at = cut
+    while at.redo_id is not None and at.redo_id not in ahead | done:
+        at = found(session, Segmentation, at.redo_id, "segmentation")
+        ahead.add(at.id)
+    return done, ahead
