@@ -51,6 +51,7 @@ class Explored:
 
     cone: Cone
     samples: Array  # (s, r) directions of length 1, each checked against the exact oracle; none when empty
+    members: tuple[int, ...]  # demonstrations they explain
     rounds: int
 
     @property
@@ -69,7 +70,7 @@ class Certificate:
     realisable: bool  # under the weights every demonstration is a cheapest sequence, and few others are
     margin: float  # smallest relative extra cost of the best alternative met that is no forced tie; 0 when not realisable
     slack: Array  # (d,) how much each demonstration costs above the cheapest of its tool, relative; 0 when realisable
-    class_sizes: tuple[int, ...]  # (d,) cheapest sequences of each tool
+    class_sizes: tuple[int, ...]  # (d,) cheapest sequences of each tool; empty when not counted
     forced: int  # dimensions of the weights that equalities fix
     identifiable: tuple[bool, ...]  # (k,) False: no demonstrated tool says anything about this weight
     intervals: Array  # (k, 2) 5 % and 95 % of each weight's share (they add up to 1) over the samples
@@ -158,20 +159,23 @@ def explore(
     else:
         cone = known.cone.with_rows(fresh, known.samples)
         trials = sample(cone, FEW, generator)
+    settled = set() if known is None else {i for i in members if i in known.members}  # checked on a larger space before
     count, rounds = FEW, 0
     while not cone.empty and rounds < ROUNDS:
         rounds += 1
-        fine = pool.separate(trials, members)
+        fine = pool.separate(trials, [i for i in members if i not in settled])
+        if fine.all():
+            fine &= pool.separate(trials, sorted(settled))
         new = unit_rows([c.difference for c in pool.cuts[taken:] if c.owner in mine], pool.frame.size)
         taken = len(pool.cuts)
         if fine.all() and count == prior.samples and rounds > 1:
-            return Explored(cone, trials[1:], rounds)
+            return Explored(cone, trials[1:], tuple(members), rounds)
         if fine.all() and rounds > 1:
             count = prior.samples
         cone = cone.with_rows(new, trials[fine])
         drawn = sample(cone, count, generator)
         trials = np.vstack([mean_direction(drawn), drawn]) if len(drawn) else drawn
-    return Explored(cone, trials[1:] if not cone.empty else np.zeros((0, pool.frame.size)), rounds)
+    return Explored(cone, trials[1:] if not cone.empty else np.zeros((0, pool.frame.size)), tuple(members), rounds)
 
 
 def compromise(pool: CutPool, members: Ordered[int], prior: CertifiedPrior) -> Array:
@@ -211,11 +215,11 @@ def _least_slack(cuts: list[Cut], members: list[int], signed: Array, prior: Cert
     return solve(program)[:r]
 
 
-def certificate(pool: CutPool, u: Array, explored: Explored, realisable: bool) -> Certificate:
-    """What is known, with weights u (r,)."""
+def certificate(pool: CutPool, u: Array, explored: Explored, realisable: bool, count_ties: bool = True) -> Certificate:
+    """What is known, with weights u (r,); counting the ties of each tool takes the longest."""
     frame, demonstrations = pool.frame, pool.demonstrations
-    weights = frame.weights(u) + 0.0
-    drawn = np.array([frame.weights(s) for s in explored.samples]).reshape(-1, len(weights)) if realisable else np.zeros((0, len(weights)))
+    weights = frame.weights(u)
+    drawn = frame.weights_of(explored.samples if realisable else explored.samples[:0])
     return Certificate(
         weights=weights,
         coordinates=u,
@@ -223,7 +227,7 @@ def certificate(pool: CutPool, u: Array, explored: Explored, realisable: bool) -
         realisable=realisable,
         margin=_margin(pool, weights, u) if realisable else 0.0,
         slack=np.zeros(len(demonstrations)) if realisable else np.array([excess(d, pool, u) for d in demonstrations]),
-        class_sizes=tuple(class_size(d.problem, weights) for d in demonstrations),
+        class_sizes=tuple(class_size(d.problem, weights) for d in demonstrations) if count_ties else (),
         forced=frame.size - explored.cone.basis.shape[1],
         identifiable=identifiable(frame, [d.problem for d in demonstrations]),
         intervals=_intervals(drawn if len(drawn) else weights[None], frame),
@@ -268,12 +272,9 @@ def mean_direction(samples: Array) -> Array:
 
 def _margin(pool: CutPool, weights: Array, u: Array) -> float:
     """Relative extra cost of the nearest alternative that is dearer at all."""
-    found = []
-    for cut in pool.cuts:
-        own = pool.demonstrations[cut.owner].problem.feature_sum(pool.demonstrations[cut.owner].sequence)
-        found.append(float(cut.difference @ u) / max(float(np.abs(weights) @ np.abs(own)), 1e-300))
-    dearer = [x for x in found if x > 1e-9]
-    return min(dearer, default=0.0)
+    sizes = [max(float(np.abs(weights) @ np.abs(d.problem.feature_sum(d.sequence))), 1e-300) for d in pool.demonstrations]
+    extra = (float(cut.difference @ u) / sizes[cut.owner] for cut in pool.cuts)
+    return min((x for x in extra if x > 1e-9), default=0.0)
 
 
 def _intervals(weights: Array, frame: Frame) -> Array:

@@ -14,8 +14,10 @@ from app.learning.identifiable import Frame
 from app.learning.many_optima import Orders, cheapest_orders, sums_of
 from app.learning.performance_state import LearningDemonstration
 from app.learning.qp import Array
+from app.sequencing.problem import TENSOR_LIMIT
 
 CHEAPER = 1e-9  # relative: a sequence cheaper by more than this is a cut
+COSTLY = 4  # trials looked at on a tool above 14 regions, where each is a dynamic program of its own
 SAME = 1e-9  # feature sums in coordinates closer than this are the same
 
 
@@ -39,6 +41,10 @@ class CutPool:
     _targets: list[Array] = field(default_factory=list)
     _known: set[tuple[int, bytes]] = field(default_factory=set)
 
+    def copy(self) -> "CutPool":
+        """The same, to go on from twice."""
+        return CutPool(self.frame, [*self.demonstrations], [*self.cuts], self.oracle_calls, [*self._targets], set(self._known))
+
     def target(self, i: int) -> Array:
         """(r,) feature sum of a demonstration."""
         for d in self.demonstrations[len(self._targets) :]:
@@ -60,12 +66,13 @@ class CutPool:
         weights, length = trials @ self.frame.lift.T, np.linalg.norm(trials, axis=1)
         for i in members:
             problem = self.demonstrations[i].problem
-            orders = cheapest_orders(problem, weights)
-            self.oracle_calls += len(trials)
+            count = len(trials) if problem.n <= TENSOR_LIMIT else min(len(trials), COSTLY)
+            orders = cheapest_orders(problem, weights[:count])
+            self.oracle_calls += count
             differences = self.frame.reduce(sums_of(problem, orders)) - self.target(i)
             size = np.linalg.norm(differences, axis=1)
-            cheaper = np.einsum("tr,tr->t", differences, trials) < -CHEAPER * size * length
-            fine &= ~(cheaper & (size > SAME))
+            cheaper = np.einsum("tr,tr->t", differences, trials[:count]) < -CHEAPER * size * length[:count]
+            fine[:count] &= ~(cheaper & (size > SAME))
             self._keep(i, orders, differences, size)
         return fine
 

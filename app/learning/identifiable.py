@@ -94,13 +94,19 @@ class Frame:
         Of a done / not-done pair the side that the coordinate's sign asks for has the weight, the other one 0; columns
         that no tool can tell anything about have 0.
         """
-        w = np.zeros(len(self.scale))
-        for value, c in zip(u, self.coordinates, strict=True):
-            raw = value * (c.sign or 1)
-            wanted = [(j, f) for j, f in zip(c.columns, c.factors, strict=True) if (f > 0) == (raw > 0)]
-            for j, f in wanted or [(c.columns[0], c.factors[0])]:
-                w[j] = raw / (max(len(wanted), 1) * f * self.scale[j])
-        return w
+        return self.weights_of(np.asarray(u)[None])[0]
+
+    def weights_of(self, samples: Array) -> Array:
+        """The same for many, (s, r) -> (s, k)."""
+        w = np.zeros((len(samples), len(self.scale)))
+        for q, c in enumerate(self.coordinates):
+            raw = samples[:, q] * (c.sign or 1)
+            for up in (True, False):
+                wanted = [(j, f) for j, f in zip(c.columns, c.factors, strict=True) if (f > 0) == up]
+                here = np.where(raw > 0, raw, 0.0) if up else np.where(raw < 0, raw, 0.0)
+                for j, f in wanted or [(c.columns[0], c.factors[0])]:
+                    w[:, j] += here / (max(len(wanted), 1) * f * self.scale[j])
+        return w + 0.0  # no -0
 
     def coordinates_of(self, w: Array) -> Array:
         """Coordinates (r,) of weights (k,) on the features as they are."""

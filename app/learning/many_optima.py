@@ -16,9 +16,12 @@ Orders = NDArray[np.int64]  # (S, N)
 
 
 @nb.njit(cache=True, fastmath={"contract"})
-def _lowest(tensor: Array, weights: Array, n: int) -> Orders:
-    """One cheapest order (S, n) for each column of weights (k, S); of equally cheap regions the lowest id goes first."""
-    full, width, count = (1 << n) - 1, tensor.shape[2], weights.shape[1]
+def _lowest(tensor: Array, columns: NDArray[np.int64], weights: Array, n: int) -> Orders:
+    """One cheapest order (S, n) for each column of weights (j, S) on some columns of the tensor.
+
+    Of equally cheap regions the lowest id goes first.
+    """
+    full, width, count = (1 << n) - 1, len(columns), weights.shape[1]
     to_go = np.zeros((full + 1, count))
     step = np.empty(count)
     for s in range(full - 1, -1, -1):
@@ -31,7 +34,7 @@ def _lowest(tensor: Array, weights: Array, n: int) -> Orders:
             for p in range(count):
                 step[p] = to_go[t, p]
             for k in range(width):
-                x = tensor[s, a, k]
+                x = tensor[s, a, columns[k]]
                 if x != 0.0:
                     for p in range(count):
                         step[p] += x * weights[k, p]
@@ -49,7 +52,7 @@ def _lowest(tensor: Array, weights: Array, n: int) -> Orders:
                     continue
                 value = to_go[t, p]
                 for k in range(width):
-                    x = tensor[s, a, k]
+                    x = tensor[s, a, columns[k]]
                     if x != 0.0:
                         value += x * weights[k, p]
                 if who < 0 or value < best - 1e-12 * abs(best):
@@ -66,7 +69,8 @@ def cheapest_orders(problem: SequencingProblem, weights: Array) -> Orders:
     """
     if problem.n > TENSOR_LIMIT:
         return np.array([shortest_sequence(problem, w).sequence for w in weights], np.int64).reshape(len(weights), problem.n)
-    return _lowest(problem.tensor(), np.ascontiguousarray(np.asarray(weights).T), problem.n)
+    columns = np.flatnonzero(np.any(weights != 0, axis=0))
+    return _lowest(problem.tensor(), columns, np.ascontiguousarray(weights[:, columns].T), problem.n)
 
 
 def sums_of(problem: SequencingProblem, orders: Orders) -> Array:
@@ -86,5 +90,5 @@ def warm_up() -> None:
     """Compile or load the kernel, for tables that may and may not be written to."""
     table = np.ones((4, 2, 1))
     for _ in range(2):
-        _lowest(table, np.ones((1, 1)), 2)
+        _lowest(table, np.zeros(1, np.int64), np.ones((1, 1)), 2)
         table.flags.writeable = False

@@ -110,7 +110,8 @@ def sample(cone: Cone, count: int, generator: np.random.Generator, thin: int = 0
         return np.zeros((0, len(cone.signed)))
     rows, thin = cone.walls, thin or 4 * q
     trail = _walk(rows, cone.basis.T @ cone.inside * 0.5, _directions(np.eye(q), BURN_IN, generator), generator.random(BURN_IN))
-    shape = np.linalg.cholesky(np.cov(trail[BURN_IN // 3 :].T).reshape(q, q) + 1e-12 * np.eye(q))
+    spread = np.asarray(np.cov(trail[BURN_IN // 3 :].T), np.float64).reshape(q, q)
+    shape = np.asarray(np.linalg.cholesky(spread + 1e-12 * np.eye(q)), np.float64)
     steps = count * thin
     trail = _walk(rows, trail[-1], _directions(shape, steps, generator), generator.random(steps))
     points = trail[thin - 1 :: thin] @ cone.basis.T
