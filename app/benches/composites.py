@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.geometry.moulds import Piece, Profile, solid, straight, trace, translational
+from app.geometry.moulds import Piece
 from app.geometry.tool import Array, Mesh
 
 CORE = 1e-4  # m; the hole left at the axis, so that no triangle has a corner there

@@ -13,6 +13,8 @@ from app.geometry.tool import Array
 
 Integers = NDArray[np.int64]
 NOTABLE = 0.9  # a smaller cluster under a click is worth showing when it has at most this share of the one above
+FORCED = 2.0  # times the tolerance: RMS cost a merge may add, spread over the smaller of the two clusters
+SPECK = 1e-5  # share of the area below which a cluster may be forced in whatever it costs
 MOST_STEPS = 12  # smaller clusters offered under one click
 
 
@@ -41,7 +43,8 @@ class MergeTree:
 
         Args:
             target: Number of labels wanted; there are more when the surface has more connected pieces.
-            tolerance: Largest RMS cost of a cluster / diagonal. With both, as many as the tolerance asks for, at most `target`.
+            tolerance: Largest RMS cost of a cluster / diagonal; what a merge adds to the cost may be FORCED times as much on the
+                smaller side, so that a small feature isn't lost in a large region. With both, as many as the tolerance asks for, at most `target`.
         """
         if target is None and tolerance is None:
             raise InvalidInput("Say how many regions are wanted, or how closely they must fit.")
@@ -49,7 +52,7 @@ class MergeTree:
         if target is not None:
             keep[: max(0, self.leaves - target)] = True
         if tolerance is not None:
-            keep |= np.sqrt(np.maximum(self.costs, 0) / np.maximum(self.areas[self.leaves :], 1e-300)) <= tolerance
+            keep |= _sound(self.merges, self.costs, self.areas, tolerance)
         return _numbered(_tops(self.merges, keep, self.leaves)[self.leaf])
 
     def children_of(self, labels: NDArray[np.integer], face: int) -> tuple[NDArray[np.bool_], ...]:
@@ -117,6 +120,26 @@ def _tops(merges, keep, leaves):  # pragma: no cover - compiled
         if top[i] < 0:
             top[i] = i
     return top[:leaves]
+
+
+@nb.njit(cache=True)
+def _sound(merges, costs, areas, tolerance):  # pragma: no cover - compiled
+    """Merges of which neither they nor any below exceed the tolerance."""
+    leaves = len(areas) - len(merges)
+    sound = np.ones(len(areas), np.bool_)
+    whole = areas.max()
+    for i in range(len(merges)):
+        a, b = merges[i]
+        added = costs[i]
+        if a >= leaves:
+            added -= costs[a - leaves]
+        if b >= leaves:
+            added -= costs[b - leaves]
+        small = min(areas[a], areas[b])
+        forced = added > (FORCED * tolerance) ** 2 * small and small > SPECK * whole
+        fits = costs[i] <= tolerance**2 * areas[leaves + i]
+        sound[leaves + i] = sound[a] and sound[b] and fits and not forced
+    return sound[leaves:]
 
 
 @nb.njit(cache=True)

@@ -35,7 +35,7 @@ class SegmentationParameters:
     """How finely to cut."""
 
     target: int | None = None  # regions wanted; None: as many as the tolerance needs, at most `most`
-    tolerance: float = 1e-3  # allowed RMS distance to the primitives / diagonal
+    tolerance: float = 5e-4  # allowed RMS distance to the primitives / diagonal
     minimum_area: float = 0.02  # smaller shares of the working surface (holes) go to a neighbour, while more than wanted
     most: int = 14  # regions without a target; sequencing is exact well above, people are not
     denoise: bool = False  # smooth the normals first: for scans; it blurs the edges of clean CAD
