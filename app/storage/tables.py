@@ -214,12 +214,15 @@ class Run(SQLModel, table=True):
 
     __table_args__ = (
         one_of("kind", "performance", "effort"),
+        one_of("mode", "certified", "paper"),
         one_of("state", *RUN_STATES),
         CheckConstraint("round >= 0 AND iteration >= 0 AND seed >= 0", name="counts"),
     )
     id: str = Field(default_factory=new_id, primary_key=True)
     project_id: str = owned("project.id")
     kind: str
+    mode: str = Field(default="paper", sa_column_kwargs={"server_default": "paper"})  # of a performance run: how it learns
+    interest: list[str] = list_column()  # segmentations of the tools without a demonstration it may ask about, fixed at the start
     state: str = "queued"
     round: int = 0  # of questions: 0 before the first
     iteration: int = 0
@@ -259,6 +262,7 @@ class RunCheckpoint(SQLModel, table=True):
     state: Json = json_column()
     weights: list[float] = json_column()
     identifiable: list[bool] = json_column()
+    report: Json | None = json_column(nullable=True)  # certified: what is proved, and how sure each tool is
     created_at: str = Field(default_factory=now)
 
 
@@ -276,7 +280,7 @@ class Query(SQLModel, table=True):
     """A stored question."""
 
     __table_args__ = (
-        one_of("kind", "similarity", "preference"),
+        one_of("kind", "similarity", "preference", "pair"),
         one_of("state", "open", "answered", "withdrawn"),
         Index("uq_query_fingerprint", "run_id", "fingerprint", unique=True),
     )
@@ -284,7 +288,7 @@ class Query(SQLModel, table=True):
     run_id: str = owned("run.id")
     project_id: str = owned("project.id")
     tool_id: str = owned("tool.id")
-    demonstration_id: str = owned("demonstration.id")
+    demonstration_id: str | None = owned("demonstration.id", nullable=True)  # a pair belongs to none
     kind: str
     state: str = "open"
     round: int
@@ -303,7 +307,7 @@ class Answer(SQLModel, table=True):
     """A reply; never changed. Taking one back adds a row with the value "undone" that supersedes it."""
 
     __table_args__ = (
-        one_of("value", "similar", "not_similar", "cant_tell", "left", "right", "equal", "undone"),
+        one_of("value", "similar", "not_similar", "cant_tell", "left", "right", "equal", "both_wrong", "undone"),
         Index("uq_answer_current", "query_id", unique=True, sqlite_where=text("superseded_by IS NULL")),
     )
     id: str = Field(default_factory=new_id, primary_key=True)
@@ -329,6 +333,7 @@ class PolicyRow(SQLModel, table=True):
     identifiable: list[bool] = json_column()
     effort_weights: list[float] | None = json_column(nullable=True)
     converged: bool
+    certificate: Json | None = json_column(nullable=True)  # of a certified run: its last report
     learned_from: dict[str, int] = json_column()  # {demonstrations, answers}
     created_at: str = Field(default_factory=now)
 
