@@ -2,7 +2,7 @@
 
     AppError(message)            says what was wrong and what would be accepted
       InvalidInput      422      UnreadableMesh, IncompleteSequence, UnknownFeature, MalformedTable, TooLarge (413),
-                                 ContradictoryConstraints
+                                 ContradictoryConstraints, InvalidFeature
       NotFound          404
       Conflict          409      AlreadyAnswered, RunActive, StalePolicy, StaleVersion (412)
       LearningFailed             NotConverged, ContradictoryAnswers, EmptySample
@@ -34,6 +34,10 @@ class IncompleteSequence(InvalidInput):
 
 class UnknownFeature(InvalidInput):
     """A feature or interaction that the feature set does not have."""
+
+
+class InvalidFeature(InvalidInput):
+    """A feature of one's own that can't be read or breaks the contract every feature keeps to."""
 
 
 class ContradictoryConstraints(InvalidInput):

@@ -2,23 +2,22 @@
 
 `clean` is the product's own set for meshes, every value in [0, 1]; the height step is split into up and down, so it has
 eleven columns. `authors-real` and `authors-synthetic` give the values of the authors' published code, quirks included.
+`layout` (its own module) is ours, for any tool: how regions lie together instead of how they compare with the mean.
 Weights mean nothing under another set or version.
 """
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.errors import UnknownFeature
 from app.geometry.tool import Array, RegionGraph
-from app.sequencing.kernels import box_gaps
 from app.sequencing.layout import COLUMNS as LAYOUT_COLUMNS
-from app.sequencing.layout import layout_values
-
-Sets = NDArray[np.bool_]  # (M, N) one set of finished regions per row
+from app.sequencing.layout import layout_of
+from app.sequencing.structure import Between, Declaration, FirstTouch, Gap, MeanStep, Pairwise, Plugin, Rank, Sets, Undeclared, evaluate
 
 
 @dataclass(frozen=True)
@@ -38,6 +37,7 @@ class FeatureSet:
     version: int
     columns: tuple[Feature, ...]
     factors: dict[str, tuple[int, ...]]  # what interactions are made of: key -> columns whose sum is the factor
+    plugins: tuple[Plugin, ...] = ()  # what computes the last columns, which declare no structure
 
 
 @dataclass(frozen=True)
@@ -127,128 +127,127 @@ def feature_values(graph: RegionGraph, feature_set: FeatureSet, done: Sets) -> A
     Paper: phi_1 + phi_2 and phi_3 + phi_4 are constants of a region, so their sums over a complete sequence never differ;
     the learner leaves one of each pair out.
     """
-    return _DEFINITIONS[feature_set.name](graph, done)
+    return evaluate(declare(graph, feature_set), done)
 
 
-@dataclass(frozen=True)
-class _Progress:
-    """What the features need to know of each finished set."""
-
-    member: Array  # (M, N) 0 or 1
-    count: Array  # (M, 1) at least 1
-    started: NDArray[np.bool_]  # (M, 1)
-    edge: NDArray[np.bool_]  # (M, N) region a touches a finished one along an edge
-    corner: NDArray[np.bool_]  # (M, N) region a touches a finished one at a corner only
+def declare(graph: RegionGraph, feature_set: FeatureSet) -> tuple[Declaration, ...]:
+    """How each column depends on what is finished."""
+    base = base_name(feature_set.name)
+    columns = zip(FEATURE_SETS[base].columns, _DEFINITIONS[base](graph), strict=True)
+    kept = (declaration for column, declaration in columns if column in feature_set.columns)
+    return (*kept, *(Undeclared(p, graph) for p in feature_set.plugins))
 
 
-def _progress(graph: RegionGraph, done: Sets) -> _Progress:
-    member = done.astype(np.float64)
-    size = member.sum(axis=1, keepdims=True)
-    edge, corner = member @ graph.neighbour.T.astype(np.float64), member @ graph.corner.T.astype(np.float64)
-    return _Progress(member, np.maximum(size, 1), size > 0, edge > 0.5, corner > 0.5)
+def base_name(name: str) -> str:
+    """The built-in set that a choice of features starts from (`choice`)."""
+    return name.split("~")[0].split("+")[0]
 
 
-def _borders(graph: RegionGraph, p: _Progress) -> list[Array]:
+def _borders(graph: RegionGraph) -> tuple[Declaration, ...]:
     """phi_1 to phi_4: how much of a's border is free or taken, and the same opposite to its outer edges."""
-    taken, facing = p.member @ graph.shared.T, p.member @ graph.opposite.T
-    return [graph.shared.sum(axis=1) - taken, taken, graph.opposite.sum(axis=1) - facing, facing]
+    none, facing = np.zeros(graph.n), graph.opposite
+    return (
+        Pairwise(graph.shared.sum(axis=1), -graph.shared),
+        Pairwise(none, graph.shared),
+        Pairwise(facing.sum(axis=1), -facing),
+        Pairwise(none, facing),
+    )
 
 
-def _clean(graph: RegionGraph, done: Sets) -> Array:
+def _gap(graph: RegionGraph, of: Literal["done", "left"]) -> Gap:
+    """How full the box around a set is; nothing is left behind before the first region.
+
+    The box's area is what the authors take it for: real tables the regions whose (row, column) lies in it, synthetic
+    tables its width by height. For meshes it lies within the tool's outline, the same as the real tables' on a grid.
+    """
+    shape = "plain" if graph.source == "synthetic" else "within"
+    return Gap(graph.low, graph.high, graph.area, of, shape, np.zeros(graph.n))
+
+
+def _clean(graph: RegionGraph) -> tuple[Declaration, ...]:
     """The product's definitions: dimensionless, in [0, 1], the same on a mesh in any position and size.
 
     Paper: phi_10 is split into a step up and a step down; the learner finds the asymmetry that the authors typed in
     (99 to 21, 3 to 1). The static 1 / z term is left out: over a complete sequence it is a constant.
     """
-    p = _progress(graph, done)
-    curve, rise = graph.curvature - _mean(p, graph.curvature), graph.height - _mean(p, graph.height)
-    jump = np.where(~p.started | p.edge, 0.0, np.where(p.corner, 1 / 3, 1.0))
+    none = np.zeros(graph.n)
     share = graph.shared / np.maximum(graph.shared.sum(axis=1, keepdims=True), 1e-30)
     pull = share * graph.angle / (2 * math.pi)
-    inside, left = _gaps(graph, done), _gaps(graph, ~done)
-    columns = [
-        *_borders(graph, p),
-        jump,
-        np.broadcast_to(inside[:, None], done.shape),
-        np.broadcast_to(np.where(p.started, left[:, None], 0.0), done.shape),
-        np.where(p.started, np.abs(curve) / 2, np.abs(graph.curvature)),
-        0.5 + pull.sum(axis=1) - 2 * p.member @ pull.T,
-        np.where(p.started, np.maximum(0, rise), 0.0),
-        np.where(p.started, np.maximum(0, -rise), 0.0),
-    ]
-    return np.stack(columns, axis=-1)
+    return (
+        *_borders(graph),
+        FirstTouch(((graph.neighbour, 0.0), (graph.corner, 1 / 3)), 1.0, none),
+        _gap(graph, "done"),
+        _gap(graph, "left"),
+        MeanStep(graph.curvature, graph.curvature, 0.5, 0.5, none, np.abs(graph.curvature)),
+        Pairwise(0.5 + pull.sum(axis=1), -2 * pull),
+        MeanStep(graph.height, graph.height, 1.0, 0.0, none, none),
+        MeanStep(graph.height, graph.height, 0.0, 1.0, none, none),
+    )
 
 
-def _authors_real(graph: RegionGraph, done: Sets) -> Array:
+def _authors_real(graph: RegionGraph) -> tuple[Declaration, ...]:
     """The authors' code on their scanned tools.
 
     Paper: the corner test runs inside their loop over listed neighbours, so a corner wins unless the first listed
     neighbour is finished; the first curvature is signed; a step up costs 99, a step down 21.
     """
-    p = _progress(graph, done)
     listed = graph.first >= 0
-    first_done = listed & done[:, np.maximum(graph.first, 0)]
-    jump = np.where(first_done, 0.0, np.where(p.corner & listed, 5.0, np.where(p.edge, 0.0, 15.0)))
-    fall = _mean(p, np.abs(graph.height)) - graph.height
-    step = np.where(p.started, np.where(fall < 0, -99 * fall, 21 * fall), 0.0)
-    inside, left = _gaps(graph, done), _gaps(graph, ~done)
-    columns = [
-        *_borders(graph, p),
-        jump,
-        np.broadcast_to(inside[:, None], done.shape),
-        np.broadcast_to(np.where(p.started, left[:, None], 0.0), done.shape),
-        np.where(p.started, np.abs(graph.curvature - _mean(p, graph.curvature)), graph.curvature),
-        math.pi + graph.angle.sum(axis=1) - 2 * p.member @ graph.angle.T,
-        step + 5 / graph.height,
-    ]
-    return np.stack(columns, axis=-1)
+    first = np.zeros((graph.n, graph.n), np.bool_)
+    first[listed, graph.first[listed]] = True
+    static = 5 / graph.height
+    return (
+        *_borders(graph),
+        FirstTouch(((first, 0.0), (graph.corner & listed[:, None], 5.0), (graph.neighbour, 0.0)), 15.0),
+        _gap(graph, "done"),
+        _gap(graph, "left"),
+        MeanStep(graph.curvature, graph.curvature, 1.0, 1.0, np.zeros(graph.n), graph.curvature),
+        Pairwise(math.pi + graph.angle.sum(axis=1), -2 * graph.angle),
+        MeanStep(np.abs(graph.height), graph.height, 99.0, 21.0, static, static),
+    )
 
 
-def _authors_synthetic(graph: RegionGraph, done: Sets) -> Array:
+def _authors_synthetic(graph: RegionGraph) -> tuple[Declaration, ...]:
     """The authors' code on their synthetic tools.
 
     Paper: phi_7 is evaluated on the finished set too, so it repeats phi_6; the inverse height of a level region is 0.
     """
-    p = _progress(graph, done)
-    jump = np.where(p.edge | ~p.started, 0.0, np.where(p.corner, 5.0, 15.0))
-    fall = _mean(p, np.abs(graph.height)) - graph.height
     level = graph.height == 0
     inverse = np.where(level, 0.0, 1 / np.where(level, 1.0, graph.height))
-    step = (np.where(fall < 0, -3 * fall, fall) + inverse) / 2
-    rise = np.maximum(0, graph.curvature - _mean(p, graph.curvature))
-    inside = np.broadcast_to(_gaps(graph, done)[:, None], done.shape)
-    columns = [
-        *_borders(graph, p),
-        jump,
-        inside,
-        inside,
-        np.where(p.started, rise, np.abs(graph.curvature)),
-        graph.angle.sum(axis=1) - p.member @ graph.angle.T,
-        np.where(p.started, step, np.abs(inverse)),
-    ]
-    return np.stack(columns, axis=-1)
+    return (
+        *_borders(graph),
+        FirstTouch(((graph.neighbour, 0.0), (graph.corner, 5.0)), 15.0, np.zeros(graph.n)),
+        _gap(graph, "done"),
+        _gap(graph, "done"),
+        MeanStep(graph.curvature, graph.curvature, 1.0, 0.0, np.zeros(graph.n), np.abs(graph.curvature)),
+        Pairwise(graph.angle.sum(axis=1), -graph.angle),
+        MeanStep(np.abs(graph.height), graph.height, 1.5, 0.5, inverse / 2, np.abs(inverse)),
+    )
 
 
-def _mean(p: _Progress, values: Array) -> Array:
-    """Mean over each finished set, (M, 1)."""
-    return (p.member @ values)[:, None] / p.count
+def _layout(graph: RegionGraph) -> tuple[Declaration, ...]:
+    """How regions lie together; `layout` says what each column means."""
+    own, n = layout_of(graph), graph.n
+    degree, bonds = own.neighbour.sum(axis=1), own.alike.sum(axis=1)
+    none, still = np.zeros(n), np.zeros((n, n))
+    waiting = (own.neighbour + own.falls) / 2 / own.borders
+    late = np.arange(n)[:, None] / max(n - 1, 1)
+    return (
+        Pairwise(waiting.sum(axis=1), -waiting),
+        Between(own.alike / own.bonds),
+        Between(own.neighbour / own.borders),
+        Rank(late * bonds / 4),
+        Rank(late * degree / 4),
+        FirstTouch(((own.neighbour > 0, 0.0),), 1.0, none),
+        Pairwise(none, own.alike / np.maximum(bonds, 1e-9)[:, None]),
+        Pairwise(none, own.neighbour / np.maximum(degree, 1)[:, None]),
+        Pairwise(none, still, bonds / 4),
+        Pairwise(none, still, degree / 4),
+    )
 
 
-def _gaps(graph: RegionGraph, inside: Sets) -> Array:
-    """1 - area(S) / area(box of S) for each set (M, N) -> (M,); 0 for at most one region.
-
-    The box's area is what the authors take it for: real tables the regions whose (row, column) lies in it, synthetic
-    tables its width by height. For meshes it is the share of each region's own box that lies in it, times the region's
-    area: within the tool's outline, never below the area of S, and the same as the real tables' on a grid.
-    """
-    # stored arrays may be read-only, which the kernel would be compiled for once more
-    low, high, area = (np.require(x, np.float64, ["C", "W"]) for x in (graph.low, graph.high, graph.area))
-    return box_gaps(np.require(inside, np.bool_, ["C", "W"]), low, high, area, graph.source == "synthetic")
-
-
-_DEFINITIONS: dict[str, Callable[[RegionGraph, Sets], Array]] = {
+_DEFINITIONS: dict[str, Callable[[RegionGraph], tuple[Declaration, ...]]] = {
     "clean": _clean,
     "authors-real": _authors_real,
     "authors-synthetic": _authors_synthetic,
-    "layout": layout_values,
+    "layout": _layout,
 }

@@ -9,45 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.geometry.tool import Array
-
-
-@nb.njit(cache=True)
-def box_gaps(inside: NDArray[np.bool_], low: Array, high: Array, area: Array, plain: bool) -> Array:
-    """1 - area(S) / area(box of S) for each row S of `inside` (M, N); 0 for at most one region.
-
-    `low` and `high` (N, 2) are the regions' boxes. The box's area is its width by height if `plain`, else the regions'
-    areas times the share of their own box inside it; a region without extent along an axis is inside or not.
-    """
-    m, n = inside.shape
-    out = np.zeros(m)
-    lo, hi = np.zeros(2), np.zeros(2)
-    for i in range(m):
-        lo[:], hi[:] = np.inf, -np.inf
-        members, own = 0, 0.0
-        for a in range(n):
-            if inside[i, a]:
-                members += 1
-                own += area[a]
-                for k in range(2):
-                    lo[k], hi[k] = min(lo[k], low[a, k]), max(hi[k], high[a, k])
-        if members < 2:
-            continue
-        box = (hi[0] - lo[0]) * (hi[1] - lo[1])
-        if not plain:
-            box = 0.0
-            for b in range(n):
-                share = 1.0
-                for k in range(2):
-                    common = min(high[b, k], hi[k]) - max(low[b, k], lo[k])
-                    extent = high[b, k] - low[b, k]
-                    if extent > 0:
-                        share *= max(common, 0.0) / extent
-                    elif common < 0:
-                        share = 0.0
-                box += share * area[b]
-        if box > 0:  # walls have no area in plan view
-            out[i] = 1 - own / box
-    return out
+from app.sequencing.gaps import box_gaps
 
 
 @nb.njit(cache=True)

@@ -1,0 +1,26 @@
+"""What each feature measures, in a sentence for an engineer."""
+
+SENTENCES = {
+    "borders_unfinished": "Share of the region's border that lies along regions still to be worked.",
+    "borders_finished": "Share of the region's border that lies along finished regions.",
+    "opposite_unfinished": "Unfinished regions that lie opposite one of the region's outer edges.",
+    "opposite_finished": "Finished regions that lie opposite one of the region's outer edges.",
+    "jump": "Nothing if a neighbour is finished, a third if only a corner touches, all if the work starts somewhere new.",
+    "gaps_inside": "How far the finished regions are from filling the box around them.",
+    "gaps_left": "How far the unfinished regions are from filling the box around them.",
+    "curvature": "How differently the region is curved from the mean of what is finished.",
+    "orientation": "How far the surface turns from finished neighbours to this region.",
+    "height": "How far the region lies above or below the mean of what is finished.",
+    "height_up": "How far the region lies above the mean of what is finished.",
+    "height_down": "How far the region lies below the mean of what is finished.",
+    "falling_edge": "The region is the upper side of an edge whose lower side is still to be worked.",
+    "like_waiting": "Regions much like finished neighbours are kept waiting.",
+    "open_border": "Length of border between finished and unfinished regions.",
+    "inside_late": "A region amid others like it is worked late.",
+    "hub_late": "A region with many neighbours is worked late.",
+    "apart": "The region touches nothing that is finished.",
+    "like_finished": "Share of the region's like neighbours that are finished.",
+    "neighbours_finished": "Share of the region's neighbours that are finished.",
+    "inside_first": "The work starts amid like regions.",
+    "hub_first": "The work starts at a region with many neighbours.",
+}
