@@ -80,19 +80,43 @@ def demo(
 
 @app.command()
 def study(
-    kind: Annotated[Literal["synthetic", "real"], typer.Argument(help="Which of the authors' sets.")],
+    what: Annotated[
+        Literal["synthetic", "real", "compare", "ablation", "coverage", "effort"],
+        typer.Argument(help="One of the authors' sets, or: all learners side by side, Eq. 7 term by term, Table I, Fig. 5."),
+    ],
     data: Annotated[Path, typer.Option(exists=True, file_okay=False, help="Folder with the authors' tables.")],
-    json_file: Annotated[Path | None, typer.Option("--json", help="Also write the figures to this file.")] = None,
+    out: Annotated[Path | None, typer.Option(file_okay=False, help="Folder for figures (JSON) and plots (SVG).")] = None,
+    json_file: Annotated[Path | None, typer.Option("--json", help="synthetic, real: also write the figures to this file.")] = None,
+    seeds: Annotated[int, typer.Option(min=2, help="ablation: runs of each variant.")] = 20,
+    experts: Annotated[int, typer.Option(min=1, help="compare: made-up experts.")] = 30,
 ) -> None:
-    """Run the paper's evaluation with a scripted expert and print it."""
+    """Run one of the paper's studies with a scripted expert and print it."""
+    from app.benches import studies
+
+    if what == "compare":
+        studies.compare(data, out, typer.echo, experts)
+    elif what == "ablation":
+        studies.ablation(data, out, typer.echo, seeds)
+    elif what == "coverage":
+        studies.coverage(data, out, typer.echo)
+    elif what == "effort":
+        studies.effort(data, out, typer.echo)
+    else:
+        evaluation(what, data, out, json_file)
+
+
+def evaluation(kind: Literal["synthetic", "real"], data: Path, out: Path | None, json_file: Path | None) -> None:
+    """The paper's evaluation on one of the authors' sets."""
     from dataclasses import asdict
 
     from app.learning.study import format_study, run_study
 
     report = run_study(kind, data)
     typer.echo(format_study(report))
-    if json_file is not None:
-        json_file.write_text(json.dumps(asdict(report), indent=2, default=plain) + "\n", encoding="utf-8")
+    for place in (json_file, out / f"{kind}.json" if out else None):
+        if place is not None:
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.write_text(json.dumps(asdict(report), indent=2, default=plain) + "\n", encoding="utf-8")
 
 
 def plain(value: object) -> object:

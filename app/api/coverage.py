@@ -66,18 +66,31 @@ class CoverageRequest(Row):
     tool_id: str | None
     tool_name: str | None
     regions: list[int]
-    gain: float
+    gain: float  # rise of rho by the best of a few orders
+    expected: float  # change of rho, mean over these orders
+
+
+class Threshold(Row):
+    """Where a feature's middle level begins and ends."""
+
+    feature: str
+    low: float
+    high: float
+    rule: Literal["quantile", "range", "expert"]
 
 
 class Coverage(Row):
     """rho (Eq. 6) and what stands behind it."""
 
     rho: float | None
+    occurrence: float | None  # the same by plain occurrence: shown / possible
     captured: int
+    shown: int
     possible: int
     demonstrations: int
     steps: int
     rule: str
+    thresholds: list[Threshold]
     tables: list[InteractionTable]
     requests: list[CoverageRequest]
 

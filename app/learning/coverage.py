@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.geometry.tool import region_letters
-from app.learning.levels import Levels, Transitions, factor_groups, measure_levels, sample_transitions, sequence_values
+from app.learning.levels import LevelRules, Levels, Transitions, factor_groups, measure_levels, sample_transitions, sequence_values
 from app.learning.uniformity import uniform_p_value
 from app.sequencing.features import FeatureSet, Interaction, factor_label
 from app.sequencing.problem import SequencingProblem
@@ -63,6 +63,7 @@ class Request:
     tool_index: int
     regions: tuple[int, ...]
     gain: float  # in rho, of the best of a few orders of the tool; 0 when each new situation costs another its even spread
+    expected: float  # change of rho, mean over these orders
 
 
 @dataclass(frozen=True)
@@ -75,13 +76,22 @@ class CoverageReport:
     steps: int
     tables: tuple[InteractionTable, ...]
     thresholds: Levels
-    requests: tuple[Request, ...]  # most useful first
+    requests: tuple[Request, ...]  # tools without a demonstration first, then by expected change of rho
     left_out: tuple[int, ...]  # tools with another feature set, which can't be compared
+    shown: int = 0  # cells that some demonstration holds, however unevenly
     rule: str = RULE
+
+    @property
+    def occurrence(self) -> float:
+        """rho by plain occurrence: what is shown at all."""
+        return self.shown / self.possible if self.possible else 0.0
 
 
 def coverage(
-    problems: list[SequencingProblem], demonstrations: list[tuple[int, tuple[int, ...]]], interactions: tuple[Interaction, ...]
+    problems: list[SequencingProblem],
+    demonstrations: list[tuple[int, tuple[int, ...]]],
+    interactions: tuple[Interaction, ...],
+    rules: LevelRules | None = None,
 ) -> CoverageReport:
     """Coverage rho, the tables behind it and what to record next.
 
@@ -89,9 +99,10 @@ def coverage(
         problems: All tools of the project.
         demonstrations: (tool index, sequence).
         interactions: The ones the expert suspects.
+        rules: How each factor's levels are found; terciles if None.
 
     Returns:
-        The report; tools without a demonstration are candidates for a request.
+        The report; every tool is a candidate for a request, another order of a demonstrated one too.
 
     Raises:
         UnknownFeature: An interaction names a factor the tools don't have.
@@ -102,21 +113,23 @@ def coverage(
         Each other feature is tested for even spread over the levels that occur within that cell on any tool; p-values are
             Bonferroni-corrected, otherwise ten features would often fail by chance. A feature with one value in more than a third of all
             transitions has no three levels and is not tested. The authors' code uses a skewness limit instead.
-        The gain of a tool is the largest rise of rho over a few random orders of it: which one the expert would choose isn't known yet.
+        Tools are ranked by the mean change of rho over a few random orders: which one the expert would choose isn't known yet. The best of
+            them is told too.
     """
     first = demonstrations[0][0] if demonstrations else 0
     kind = [p.features for p in problems]
     alike = [i for i in range(len(problems)) if kind[i] == kind[first]]
     if not alike:
         return CoverageReport(0.0, 0, 0, 0, (), Levels((), (), ()), (), ())
-    study = _Study.of(problems, alike, interactions)
+    study = _Study.of(problems, alike, interactions, rules or LevelRules())
     shown = [study.levels.of(sequence_values(problems[i], s)) for i, s in demonstrations if i in study.sampled]
     steps = np.concatenate(shown) if shown else np.zeros((0, len(study.levels.keys)), np.int64)
     states = study.states(steps)
     captured, possible = _tally(states)
     waiting = [i for i in alike if i not in {i for i, _ in demonstrations}]
     tables = tuple(study.table(k, states[k], waiting) for k in range(len(interactions)))
-    requests = sorted(study.requests(steps, tables, waiting, captured, possible), key=lambda r: (-r.gain, r.tool_index))
+    asked = study.requests(steps, tables, captured, possible)
+    requests = sorted(asked, key=lambda r: (r.tool_index not in waiting, -r.expected, -r.gain, r.tool_index))
     left_out = tuple(i for i in range(len(problems)) if i not in alike)
     return CoverageReport(
         rho=captured / possible if possible else 0.0,
@@ -127,6 +140,7 @@ def coverage(
         thresholds=study.levels,
         requests=tuple(requests),
         left_out=left_out,
+        shown=sum(j.count > 0 for table in states for j in table),
     )
 
 
@@ -154,7 +168,7 @@ class _Study:
     regions: dict[int, int]  # tool index -> number of regions
 
     @staticmethod
-    def of(problems: list[SequencingProblem], alike: list[int], interactions: tuple[Interaction, ...]) -> "_Study":
+    def of(problems: list[SequencingProblem], alike: list[int], interactions: tuple[Interaction, ...], rules: LevelRules) -> "_Study":
         features = problems[alike[0]].features
         phrases = tuple((_phrase(i.first, features), _phrase(i.second, features)) for i in interactions)
         groups = factor_groups(features)
@@ -162,7 +176,7 @@ class _Study:
         home = {key: next(g for g in keys if set(features.factors[key]) <= set(groups[g])) for key in features.factors}
         axes = tuple((keys.index(home[i.first]), keys.index(home[i.second])) for i in interactions)
         sampled = {i: sample_transitions(problems[i]) for i in alike}
-        levels = measure_levels(keys, np.concatenate([t.values for t in sampled.values()]))
+        levels = measure_levels(keys, np.concatenate([t.values for t in sampled.values()]), rules)
         grids = {i: levels.of(t.values) for i, t in sampled.items()}
         everything = np.concatenate(list(grids.values()))
         spread = tuple(_counts(everything, pair) > 0 for pair in axes)
@@ -211,26 +225,24 @@ class _Study:
         row, column = divmod(cell, 3)
         return f"a {LEVEL_WORDS[row]} {self.phrases[k][0]} with a {LEVEL_WORDS[column]} {self.phrases[k][1]}"
 
-    def requests(
-        self, steps: Grid, tables: tuple[InteractionTable, ...], waiting: list[int], captured: int, possible: int
-    ) -> list[Request]:
-        """One request per tool without a demonstration that can raise rho or has a situation nobody has shown."""
-        found = []
-        for i in waiting:
-            gains = []
-            for order in self.sampled[i].orders[:ORDERS_TRIED]:
-                now, of = _tally(self.states(np.concatenate([steps, self.grids[i][order]])))
-                gains.append(now / of - (captured / possible if possible else 0.0))
+    def requests(self, steps: Grid, tables: tuple[InteractionTable, ...], captured: int, possible: int) -> list[Request]:
+        """One request per tool that can raise rho or has a situation nobody has shown."""
+        now, found = captured / possible if possible else 0.0, []
+        for i in self.grids:
+            changes = [self._rho(np.concatenate([steps, self.grids[i][order]])) - now for order in self.sampled[i].orders[:ORDERS_TRIED]]
             weak = [(c, dict(c.tools)[i]) for t in tables for row in t.cells for c in row if c.request and i in dict(c.tools)]
-            gain = max(0.0, *gains)
+            gain = max(0.0, *changes)
             if weak and (gain > 0 or any(c.state == "missing" for c, _ in weak)):
                 weak.sort(key=lambda pair: pair[0].state != "missing")
-                regions = weak[0][1]
+                regions = tuple(sorted(weak[0][1]))
                 letters = region_letters(self.regions[i])
-                places = _listed([letters[a] for a in sorted(regions)])
-                text = f"{weak[0][0].text}, most of all at {places}"
-                found.append(Request(text[0].upper() + text[1:], i, tuple(sorted(regions)), float(gain)))
+                text = f"{weak[0][0].text}, most of all at {_listed([letters[a] for a in regions])}"
+                found.append(Request(text[0].upper() + text[1:], i, regions, float(gain), float(np.mean(changes))))
         return found
+
+    def _rho(self, steps: Grid) -> float:
+        now, of = _tally(self.states(steps))
+        return now / of
 
 
 def _advice(state: CellState, text: str, tools: tuple[tuple[int, tuple[int, ...]], ...], waiting: list[int]) -> str:

@@ -91,9 +91,9 @@ def run_study(
         MalformedTable: A table can't be read.
     """
     parameters = parameters or PerformanceParameters()
-    tables = _read(kind, folder)
+    tables = read_tables(kind, folder)
     problems = {number: problem_for(table.tool.graph, INTERACTIONS[kind]) for number, table in tables.items()}
-    recorded = {number: _recorded(number, table) for number, table in tables.items()}
+    recorded = {number: recorded_in(number, table) for number, table in tables.items()}
     trained = [number for number in tables if number in TRAINED_ON[kind]]
     demonstrations = [LearningDemonstration(problems[i], recorded[i]) for i in trained]
     suspected = (Interaction("height", "curvature"), Interaction("orientation", "curvature"))
@@ -123,7 +123,13 @@ def run_study(
     )
 
 
-def _read(kind: Kind, folder: Path) -> dict[int, RegionTable]:
+def read_tables(kind: Kind, folder: Path) -> dict[int, RegionTable]:
+    """The authors' tables of a kind by number.
+
+    Raises:
+        NotFound: None of the training tools is there.
+        MalformedTable: A table can't be read.
+    """
     place = folder / kind if (folder / kind).is_dir() else folder
     found = {int(m[1]): path for path in place.glob("*.csv") if (m := re.fullmatch(r"Mold_(\d+)_Data\.csv", path.name))}
     if not found:
@@ -134,7 +140,8 @@ def _read(kind: Kind, folder: Path) -> dict[int, RegionTable]:
     return tables
 
 
-def _recorded(number: int, table: RegionTable) -> tuple[int, ...]:
+def recorded_in(number: int, table: RegionTable) -> tuple[int, ...]:
+    """The expert's order in a table."""
     if table.expert is None:
         raise InvalidInput(f"The table of tool {number} has no expert's sequence; the study needs one for every tool.")
     return table.expert

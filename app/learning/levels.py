@@ -1,16 +1,20 @@
 """Low, middle and high values of each feature factor over a project's tools (Sec. IV-C)."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.errors import InvalidInput, UnknownFeature
 from app.learning.qp import Array
 from app.sequencing.features import FeatureSet
 from app.sequencing.problem import SequencingProblem
 
 ORDERS = 24  # random orders per tool whose steps stand for all transitions
 SEED = 20230523  # fixed: the same tools always give the same levels
+Rule = Literal["quantile", "range", "expert"]
+
 EVEN = 1e-9  # values this close (as a share of the range) are on the same side of a threshold
 
 
@@ -24,12 +28,28 @@ class Transitions:
 
 
 @dataclass(frozen=True)
+class LevelRules:
+    """How the two thresholds of each factor are found."""
+
+    default: Rule = "quantile"
+    chosen: tuple[tuple[str, Rule], ...] = ()  # factors with another rule
+    expert: tuple[tuple[str, float, float], ...] = ()  # factor, low, high: set by the expert
+
+    def of(self, key: str) -> Rule:
+        """The rule of a factor."""
+        if any(key == name for name, *_ in self.expert):
+            return "expert"
+        return dict(self.chosen).get(key, self.default)
+
+
+@dataclass(frozen=True)
 class Levels:
-    """Two thresholds per factor, stored with every report."""
+    """Two thresholds per factor and where they come from, stored with every report."""
 
     keys: tuple[str, ...]
     low: tuple[float, ...]  # at most this is level 0
     high: tuple[float, ...]  # above this is level 2
+    rules: tuple[Rule, ...] = ()
 
     def of(self, values: Array) -> NDArray[np.int64]:
         """Level 0, 1 or 2 of factor values (..., factors)."""
@@ -69,15 +89,36 @@ def sequence_values(problem: SequencingProblem, sequence: tuple[int, ...]) -> Ar
     return factor_values(problem, problem.values(_prefixes(order)))[np.arange(problem.n), order[0]]
 
 
-def measure_levels(keys: tuple[str, ...], values: Array) -> Levels:
-    """Terciles of factor values (T, factors).
+def measure_levels(keys: tuple[str, ...], values: Array, rules: LevelRules | None = None) -> Levels:
+    """Two thresholds per factor from values (T, factors): terciles, thirds of the range, or what the expert says.
+
+    Raises:
+        UnknownFeature: A rule names a factor that isn't there.
+        InvalidInput: An expert's lower threshold is above the upper one.
 
     Paper: thresholds are typed in by hand there. Terciles make each level equally common over the tools at hand, which is what an even
         spread is later tested against; a factor with many equal values (most steps touch a finished region) has fewer levels.
     """
-    low, high = np.quantile(values, [1 / 3, 2 / 3], axis=0)
-    slack = EVEN * np.ptp(values, axis=0)
-    return Levels(keys, tuple(float(x) for x in low + slack), tuple(float(x) for x in high + slack))
+    rules = rules or LevelRules()
+    unknown = sorted({name for name, *_ in (*rules.chosen, *rules.expert)} - set(keys))
+    if unknown:
+        raise UnknownFeature(f"There is no feature '{unknown[0]}' to set levels of. Choose from: {', '.join(sorted(keys))}.")
+    pairs = [_thresholds(key, values[:, k], rules) for k, key in enumerate(keys)]
+    return Levels(keys, tuple(a for a, _ in pairs), tuple(b for _, b in pairs), tuple(rules.of(key) for key in keys))
+
+
+def _thresholds(key: str, values: Array, rules: LevelRules) -> tuple[float, float]:
+    rule, slack = rules.of(key), EVEN * float(np.ptp(values))
+    if rule == "expert":
+        low, high = next((a, b) for name, a, b in rules.expert if name == key)
+        if not low <= high:
+            raise InvalidInput(f"The lower threshold of '{key}' is {low:g}, above the upper one, {high:g}. Give the smaller one first.")
+        return low, high
+    if rule == "range":
+        low, high = np.linspace(values.min(), values.max(), 4)[1:3]
+    else:
+        low, high = np.quantile(values, [1 / 3, 2 / 3])
+    return float(low + slack), float(high + slack)
 
 
 def _prefixes(orders: NDArray[np.int64]) -> NDArray[np.bool_]:

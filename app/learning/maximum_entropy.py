@@ -40,7 +40,7 @@ class SoftFit:
     weights: Array  # (F,) on scaled features
     penalty: float  # lambda of the squared norm
     surprise: float  # mean -log p of a demonstration under these weights
-    curvatures: Array  # (lessons, F, F) covariance of the feature sums of each tool under these weights
+    curvatures: Array  # (lessons, F, F) covariance of the feature sums of each tool under these weights; none if not asked for
 
     @property
     def covariance(self) -> Array:
@@ -72,33 +72,30 @@ def surprise(lesson: Lesson, w: Array) -> tuple[float, Array]:
     return float(w @ lesson.total - to_go[0]), lesson.total - expected_sums(lesson.values, chosen, lesson.n)
 
 
-def fit(
-    lessons: list[Lesson], penalty: float, start: Array | None = None, lower: Array | None = None, prior: Array | None = None
-) -> SoftFit:
-    """Minimise the mean surprise + penalty / 2 * |w - prior|^2.
+def fit(lessons: list[Lesson], penalty: float, start: Array | None = None, lower: Array | None = None, curved: bool = True) -> SoftFit:
+    """Minimise the mean surprise + penalty / 2 * |w|^2.
 
     Args:
         lessons: At least one.
         penalty: Above 0.
-        start: Where to begin, the prior if None.
+        start: Where to begin, 0 if None.
         lower: Lower bounds of the weights, none if None.
-        prior: Centre of the penalty, 0 if None.
+        curved: Whether to measure the curvatures, which costs as much as the fit.
     """
     size = len(lessons[0].total)
-    centre = np.zeros(size) if prior is None else prior
     bounds = None if lower is None else [(float(x), None) for x in lower]
-    begin = centre if start is None else start
+    begin = np.zeros(size) if start is None else start
     begin = begin if lower is None else np.maximum(begin, lower)
 
     def objective(w: Array) -> tuple[float, Array]:
         parts = [surprise(lesson, w) for lesson in lessons]
-        value = sum(v for v, _ in parts) / len(parts) + penalty / 2 * float((w - centre) @ (w - centre))
-        return value, sum((g for _, g in parts), np.zeros(size)) / len(parts) + penalty * (w - centre)
+        value = sum(v for v, _ in parts) / len(parts) + penalty / 2 * float(w @ w)
+        return value, sum((g for _, g in parts), np.zeros(size)) / len(parts) + penalty * w
 
     found = minimize(objective, begin, jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": STEPS, "ftol": 1e-12, "gtol": 1e-7})
     w = np.asarray(found.x, np.float64)
     known = sum(surprise(lesson, w)[0] for lesson in lessons) / len(lessons)
-    return SoftFit(w, penalty, known, curvatures_at(lessons, w))
+    return SoftFit(w, penalty, known, curvatures_at(lessons, w) if curved else np.zeros((0, size, size)))
 
 
 def curvatures_at(lessons: list[Lesson], w: Array) -> Array:

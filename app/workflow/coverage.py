@@ -6,12 +6,14 @@ from sqlmodel import Session
 
 from app.errors import InvalidInput, UnknownFeature
 from app.learning.coverage import RULE, Cell, CoverageReport, InteractionTable
-from app.sequencing.features import interaction_label
+from app.learning.levels import Levels
+from app.sequencing.features import FeatureSet, interaction_label
 from app.storage import emit
 from app.storage.tables import Project, Segmentation, ToolRow
 from app.workflow.context import Context
+from app.workflow.feature_choice import project_features
 from app.workflow.lookup import present, standing
-from app.workflow.project_rows import project_features, project_json, touch
+from app.workflow.project_rows import project_json, touch
 from app.workflow.reports import report_of
 
 Json = dict[str, Any]
@@ -23,7 +25,7 @@ def get_coverage(ctx: Context, project_id: str) -> Json:
     def query(session: Session) -> Json:
         project = present(session, Project, project_id)
         tools, report = report_of(ctx.values, session, project, ())
-        return coverage_json(ctx, session, project, tools, report)
+        return coverage_json(session, project, tools, report)
 
     return ctx.store.read(query)
 
@@ -58,24 +60,40 @@ def set_interactions(ctx: Context, project_id: str, interactions: list[dict[str,
     return ctx.store.read(lambda session: project_json(ctx.values, session, present(session, Project, project_id)))
 
 
-NOTHING: Json = {"rho": None, "captured": 0, "possible": 0, "demonstrations": 0, "steps": 0, "rule": RULE, "tables": [], "requests": []}
+NOTHING: Json = {
+    "rho": None,
+    "occurrence": None,
+    "captured": 0,
+    "shown": 0,
+    "possible": 0,
+    "demonstrations": 0,
+    "steps": 0,
+    "rule": RULE,
+    "thresholds": [],
+    "tables": [],
+    "requests": [],
+}
 
 
-def coverage_json(ctx: Context, session: Session, project: Project, tools: list[ToolRow], report: CoverageReport | None) -> Json:
+def coverage_json(session: Session, project: Project, tools: list[ToolRow], report: CoverageReport | None) -> Json:
     """The report as REST shows it."""
     if report is None:
         return NOTHING
     shown = [d for d in standing(session, project.id) if d.tool_id in {t.id for t in tools}]
     cut = session.get(Segmentation, shown[0].segmentation_id)
     assert cut is not None
+    features = project_features(session, project.id, cut.feature_set)
     return {
         "rho": report.rho,
+        "occurrence": report.occurrence,
         "captured": report.captured,
+        "shown": report.shown,
         "possible": report.possible,
         "demonstrations": len(shown),
         "steps": report.steps,
         "rule": report.rule,
-        "tables": [_table(ctx, session, cut, tools, table) for table in report.tables],
+        "thresholds": _thresholds(report.thresholds),
+        "tables": [_table(features, tools, table) for table in report.tables],
         "requests": [
             {
                 "text": r.text,
@@ -83,15 +101,20 @@ def coverage_json(ctx: Context, session: Session, project: Project, tools: list[
                 "tool_name": tools[r.tool_index].name,
                 "regions": [int(a) for a in r.regions],
                 "gain": float(r.gain),
+                "expected": float(r.expected),
             }
             for r in report.requests
         ],
     }
 
 
-def _table(ctx: Context, session: Session, cut: Segmentation, tools: list[ToolRow], table: InteractionTable) -> Json:
+def _thresholds(levels: Levels) -> list[Json]:
+    rows = zip(levels.keys, levels.low, levels.high, levels.rules, strict=True)
+    return [{"feature": key, "low": low, "high": high, "rule": rule} for key, low, high, rule in rows]
+
+
+def _table(features: FeatureSet, tools: list[ToolRow], table: InteractionTable) -> Json:
     interaction = table.interaction
-    features = ctx.values.problem(session, cut, (interaction,)).features
     return {
         "first": interaction.first,
         "second": interaction.second,

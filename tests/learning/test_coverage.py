@@ -6,9 +6,9 @@ import math
 import numpy as np
 import pytest
 
-from app.errors import UnknownFeature
-from app.learning.coverage import coverage
-from app.learning.levels import factor_groups, measure_levels, sample_transitions, sequence_values
+from app.errors import InvalidInput, UnknownFeature
+from app.learning.coverage import ORDERS_TRIED, coverage
+from app.learning.levels import SEED, LevelRules, factor_groups, measure_levels, sample_transitions, sequence_values
 from app.learning.uniformity import uniform_p_value
 from app.sequencing.features import DEFAULT_INTERACTIONS, FEATURE_SETS, Interaction
 from app.sequencing.problem import problem_for
@@ -128,14 +128,48 @@ def test_repeating_one_step_kind_is_uneven():
 
 
 def test_request_gain_is_a_rise_in_rho(tools):
-    """Requests are sorted, name undemonstrated tools and existing regions, and promise no more than all that is missing."""
+    """Tools without a demonstration come first, sorted by expected change; none promises more than all that is missing."""
     report = coverage(tools, recorded(tools, 1), DEFAULT_INTERACTIONS)
-    gains = [r.gain for r in report.requests]
-    assert gains == sorted(gains, reverse=True)
-    assert all(0 < g <= 1 - report.rho for g in gains)
+    order = [(r.tool_index == 0, -r.expected) for r in report.requests]
+    assert order == sorted(order)
+    assert {r.tool_index for r in report.requests} >= set(range(1, len(tools)))
     for r in report.requests:
-        assert r.tool_index != 0
+        assert r.expected <= r.gain <= 1 - report.rho
         assert all(0 <= a < tools[r.tool_index].n for a in r.regions)
+
+
+def test_expected_gain_is_the_mean_over_the_tried_orders(tools):
+    """Recomputed by adding each tried order as a demonstration."""
+    report = coverage(tools, recorded(tools, 1), DEFAULT_INTERACTIONS)
+    request = report.requests[0]
+    problem = tools[request.tool_index]
+    generator = np.random.default_rng([SEED, problem.n])
+    orders = [tuple(int(a) for a in generator.permutation(problem.n)) for _ in range(ORDERS_TRIED)]
+    after = [coverage(tools, [*recorded(tools, 1), (request.tool_index, s)], DEFAULT_INTERACTIONS).rho for s in orders]
+    assert request.expected == pytest.approx(np.mean(after) - report.rho)
+    assert request.gain == pytest.approx(max(after) - report.rho)
+
+
+def test_plain_occurrence_counts_uneven_situations_too(tools):
+    report = coverage(tools, recorded(tools, 3), DEFAULT_INTERACTIONS)
+    cells = [c for t in report.tables for row in t.cells for c in row]
+    assert report.shown == sum(c.count > 0 for c in cells)
+    assert report.occurrence == report.shown / report.possible
+    assert report.occurrence >= report.rho
+
+
+def test_thresholds_by_rule():
+    """Terciles of 0..9 at 3 and 6; thirds of the range of skewed values; the expert's own numbers; each rule is stored."""
+    values = np.stack([np.arange(10.0), np.arange(10.0) ** 2, np.arange(10.0)], axis=1)
+    levels = measure_levels(("a", "b", "c"), values, LevelRules(chosen=(("b", "range"),), expert=(("c", 1.5, 7.5),)))
+    assert levels.low == pytest.approx((3.0, 27.0, 1.5))
+    assert levels.high == pytest.approx((6.0, 54.0, 7.5))
+    assert levels.rules == ("quantile", "range", "expert")
+    assert np.bincount(levels.of(values)[:, 2]).tolist() == [2, 6, 2]
+    with pytest.raises(InvalidInput, match="above the upper one"):
+        measure_levels(("a",), values[:, :1], LevelRules(expert=(("a", 2.0, 1.0),)))
+    with pytest.raises(UnknownFeature, match="no feature 'colour'"):
+        measure_levels(("a",), values[:, :1], LevelRules(chosen=(("colour", "range"),)))
 
 
 def test_flat_tools_have_impossible_cells():

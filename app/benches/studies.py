@@ -1,0 +1,135 @@
+"""What `apprentice study` does beyond one evaluation: compare learners, take Eq. 7 apart, coverage of subsets, effort before and after."""
+
+import json
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.benches.plots import Curve, Plot, as_svg
+from app.learning.ablation import Ablation, ablate
+from app.learning.comparing import (
+    Score,
+    format_comparison,
+    learners,
+    leave_one_out,
+    made_up_cases,
+    score,
+    summed,
+    synthetic_case,
+)
+from app.learning.coverage_study import format_coverage, study_coverage
+from app.learning.effort_study import study_effort
+from app.learning.evaluation import TRAINED_ON, Kind, read_tables, recorded_in
+from app.learning.expert import ScriptedExpert
+from app.learning.performance_state import LearningDemonstration
+from app.sequencing.problem import problem_for
+
+Say = Callable[[str], None]
+
+QUANTITIES = {
+    "spread": ("Spread of the samples' costs", "Deviation of cost / |w|"),
+    "shift": ("Shift of the cheapest samples at each update", "Distance of feature sums"),
+    "violations": ("Recorded orders that are not the cheapest", "Demonstrations"),
+}
+
+
+def demonstrations(kind: Kind, folder: Path) -> dict[int, LearningDemonstration]:
+    """The authors' tools of a kind with their recorded orders, without interactions."""
+    tables = read_tables(kind, folder)
+    return {i: LearningDemonstration(problem_for(t.tool.graph, ()), recorded_in(i, t)) for i, t in tables.items()}
+
+
+def compare(data: Path, out: Path | None, say: Say, experts: int = 30, seed: int = 0) -> None:
+    """Every learner on synthetic tools, real tools one left out at a time, and made-up experts."""
+    scores: list[Score] = []
+    synthetic = demonstrations("synthetic", data)
+    trained = TRAINED_ON["synthetic"]
+    columns = len(next(iter(synthetic.values())).problem.columns)
+    scores += _all_learners([synthetic_case(synthetic, trained)], ScriptedExpert(np.ones(columns), None), seed)
+    say(format_comparison(summed(scores)) + "\n")
+    real = list(_all_learners(leave_one_out(demonstrations("real", data)), ScriptedExpert(None, None), seed))
+    say(format_comparison(summed(real)) + "\n")
+    scores += real
+    problems = {i: d.problem for i, d in synthetic.items()}
+    invented: list[Score] = []
+    for case in made_up_cases(problems, trained, experts, seed):
+        invented += _all_learners([case], ScriptedExpert(case.truth, None), seed)
+    say(format_comparison(summed(invented)))
+    scores += invented
+    _save(out, "compare.json", {"seed": seed, "lines": summed(scores), "scores": scores})
+
+
+def _all_learners(cases: list[Any], expert: ScriptedExpert, seed: int) -> Iterator[Score]:
+    for name, learner in learners(expert, seed).items():
+        for case in cases:
+            yield score(name, learner, case, seed, time.process_time)
+
+
+def ablation(data: Path, out: Path | None, say: Say, seeds: int = 20, updates: int = 60) -> None:
+    """Fig. 4 on the synthetic training tools."""
+    shown = demonstrations("synthetic", data)
+    found = ablate([shown[i] for i in TRAINED_ON["synthetic"]], seeds, updates)
+    say(f"Eq. 7 without each of its terms, {found.seeds} seeds, {found.updates} updates: mean at the end and its 95 % interval")
+    say(f"{'':12s}" + "".join(f"{name:>26s}" for name in QUANTITIES))
+    for variant, bands in found.bands.items():
+        ends = [f"{b.mean[-1]:.3f} [{b.low[-1]:.3f}, {b.high[-1]:.3f}]" for b in bands.values()]
+        say(f"{variant:12s}" + "".join(f"{end:>26s}" for end in ends))
+    _save(out, "ablation.json", asdict(found))
+    for quantity in QUANTITIES:
+        _write(out, f"ablation_{quantity}.svg", as_svg(ablation_plot(found, quantity)))
+
+
+def ablation_plot(found: Ablation, quantity: str) -> Plot:
+    """One of Fig. 4's three plots."""
+    title, label = QUANTITIES[quantity]
+    x = np.arange(found.updates + 1.0)
+    curves = tuple(Curve(name, x, b[quantity].mean, b[quantity].low, b[quantity].high) for name, b in found.bands.items())
+    return Plot(title, "Update", label, curves)
+
+
+def coverage(data: Path, out: Path | None, say: Say) -> None:
+    """Table I."""
+    results = {}
+    for kind in ("synthetic", "real"):
+        results[kind] = study_coverage(demonstrations(kind, data))
+        say(format_coverage(results[kind], kind) + "\n")
+    _save(out, "coverage.json", results)
+
+
+def effort(data: Path, out: Path | None, say: Say) -> None:
+    """Fig. 5 on the synthetic split."""
+    shown = demonstrations("synthetic", data)
+    trained, unseen = [[d for i, d in shown.items() if (i in TRAINED_ON["synthetic"]) is part] for part in (True, False)]
+    found = study_effort(trained, unseen, np.ones(len(trained[0].problem.columns)))
+    say("Preferred side, learned on the training tools: tools whose chosen order has the least effort, before -> after learning")
+    say("(tools on which the preference makes no difference are left out)")
+    say("preference      answers   training tools   unseen tools")
+    for r in found:
+        seen, new = (f"{t.before} -> {t.after} of {t.tools}" for t in (r.trained, r.unseen))
+        say(f"{r.preference:14s}  {r.answers:7d}   {seen:>14s}   {new:>12s}")
+    _save(out, "effort.json", found)
+    x = np.arange(1.0, len(found) + 1)
+    both = [[(getattr(t, at), t.tools) for r in found for t in (r.trained, r.unseen)] for at in ("before", "after")]
+    share = [np.array([100 * (a + b) / max(m + n, 1) for (a, m), (b, n) in zip(s[::2], s[1::2], strict=True)]) for s in both]
+    curves = (Curve("before", x, share[0]), Curve("after", x, share[1]))
+    _write(out, "effort.svg", as_svg(Plot("Chosen order has the least effort, all tools", "Preference, as listed", "% of tools", curves)))
+
+
+def _save(out: Path | None, name: str, value: Any) -> None:
+    _write(out, name, json.dumps(value, indent=2, default=_plain) + "\n")
+
+
+def _write(out: Path | None, name: str, text: str) -> None:
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        (out / name).write_text(text, encoding="utf-8")
+
+
+def _plain(value: Any) -> Any:
+    if is_dataclass(value) and not isinstance(value, type):
+        return asdict(value)
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else str(value)

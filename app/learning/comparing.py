@@ -1,0 +1,219 @@
+"""Every learner on the same demonstrations: the authors' synthetic split, their real tools one left out at a time, and made-up experts.
+
+Paper: the project page says the synthetic expert weighs all features alike; regret is measured against that. Of the real tools' expert
+no weights are known, so no regret. Made-up experts have weights drawn from an exponential distribution, on the synthetic tools.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.learning.baselines.copying import copy_nearest, draw_weights
+from app.learning.baselines.learner import Learned, Learner, Sequence, by_weights
+from app.learning.baselines.likelihood import by_bayes, by_maximum_entropy
+from app.learning.baselines.margin_planning import plan_by_margin
+from app.learning.certified import certify
+from app.learning.expert import ScriptedExpert
+from app.learning.generalising import learn_generalising, on_features
+from app.learning.hits import judge
+from app.learning.performance import performance_step, start_performance
+from app.learning.performance_state import LearningDemonstration, PerformanceParameters
+from app.learning.policy import Policy
+from app.learning.prediction import predict
+from app.learning.qp import Array
+from app.sequencing.comparison import kendall_tau
+from app.sequencing.features import FEATURE_SETS
+from app.sequencing.problem import SequencingProblem
+from app.sequencing.shortest import shortest_sequence
+
+Clock = Callable[[], float]
+SAME = 1e-9  # feature sums this close are equal
+OWN = 1  # stream of the learners' generators, apart from the one the made-up experts come from
+
+
+@dataclass(frozen=True)
+class Case:
+    """One set of demonstrations and what they are tested on."""
+
+    kind: str  # "synthetic" | "real" | "made up"
+    train: tuple[LearningDemonstration, ...]
+    test: tuple[LearningDemonstration, ...]
+    truth: Array | None  # the expert's weights, where known
+
+
+@dataclass(frozen=True)
+class Score:
+    """One learner on one case."""
+
+    learner: str
+    kind: str
+    train_hits: int
+    train: int
+    test_hits: int
+    test: int
+    regret: float | None  # mean over test tools: extra true cost of the predicted order, relative
+    tau: float  # mean over test tools
+    answers: int
+    cpu_s: float
+
+
+@dataclass(frozen=True)
+class Line:
+    """One learner over all cases of a kind."""
+
+    learner: str
+    kind: str
+    cases: int
+    train_success: float
+    test_success: float
+    test_hits: int
+    test: int
+    regret: float | None
+    tau: float
+    answers: float  # per case
+    cpu_s: float  # per case
+
+
+def learners(expert: ScriptedExpert, seed: int) -> dict[str, Learner]:
+    """Name -> learner; the expert answers where a learner asks."""
+    return {
+        "ours, generalising": generalise,
+        "ours, certified": lambda demos, _: _certified(demos, seed),
+        "Algorithm 1 (paper)": lambda demos, _: _paper(demos, expert, seed),
+        "max-margin planning": plan_by_margin,
+        "maximum entropy": by_maximum_entropy,
+        "Bayesian (MCMC)": by_bayes,
+        "nearest tool": copy_nearest,
+        "random weights": draw_weights,
+    }
+
+
+def generalise(demonstrations: list[LearningDemonstration], generator: np.random.Generator) -> Learned:
+    """`learn_generalising` in the shape of the harness; the generator is not used."""
+    del generator
+    policy = learn_generalising(demonstrations).policy
+    features = FEATURE_SETS[policy.features]
+    return Learned(lambda problem: predict(on_features(problem, features), policy).sequence, policy)
+
+
+def _certified(demonstrations: list[LearningDemonstration], seed: int) -> Learned:
+    found = certify(demonstrations, seed=seed)
+    return by_weights(demonstrations, found.weights, found.identifiable)
+
+
+def _paper(demonstrations: list[LearningDemonstration], expert: ScriptedExpert, seed: int) -> Learned:
+    parameters = PerformanceParameters()
+    state, answers = start_performance(demonstrations, parameters, seed), {}
+    while True:
+        result = performance_step(demonstrations, parameters, state, answers, parameters.iterations)
+        state = result.state
+        for q in result.questions:
+            d = demonstrations[q.demonstration]
+            answers[q.fingerprint] = expert.similar(d.problem, d.sequence, q.candidate)
+        if result.outcome not in ("training", "questions"):
+            return by_weights(demonstrations, result.weights, state.identifiable, len(answers))
+
+
+def synthetic_case(shown: dict[int, LearningDemonstration], trained: tuple[int, ...]) -> Case:
+    """The published split; the expert weighs all features alike."""
+    truth = np.ones(len(next(iter(shown.values())).problem.columns))
+    return Case("synthetic", tuple(shown[i] for i in trained), tuple(d for i, d in shown.items() if i not in trained), truth)
+
+
+def leave_one_out(shown: dict[int, LearningDemonstration]) -> list[Case]:
+    """Each tool predicted from all others."""
+    return [Case("real", tuple(d for j, d in shown.items() if j != i), (shown[i],), None) for i in shown]
+
+
+def made_up_cases(problems: dict[int, SequencingProblem], trained: tuple[int, ...], count: int, seed: int) -> Iterator[Case]:
+    """Experts of random weights on the same tools and split."""
+    for k in range(count):
+        generator = np.random.default_rng([seed, 0, k])
+        truth = generator.exponential(size=len(next(iter(problems.values())).columns))
+        shown = {i: LearningDemonstration(p, shortest_sequence(p, truth).sequence) for i, p in problems.items()}
+        yield Case("made up", tuple(shown[i] for i in trained), tuple(d for i, d in shown.items() if i not in trained), truth)
+
+
+def score(name: str, learner: Learner, case: Case, seed: int, clock: Clock) -> Score:
+    """Learn, predict, compare."""
+    started = clock()
+    learned = learner(list(case.train), np.random.default_rng([seed, OWN, len(case.train)]))
+    spent = clock() - started
+    orders = [learned.order(d.problem) for d in case.test]
+    return Score(
+        learner=name,
+        kind=case.kind,
+        train_hits=sum(_hit(learned, d, learned.order(d.problem)) for d in case.train),
+        train=len(case.train),
+        test_hits=sum(_hit(learned, d, order) for d, order in zip(case.test, orders, strict=True)),
+        test=len(case.test),
+        regret=None if case.truth is None else float(np.mean([_regret(d, o, case.truth) for d, o in zip(case.test, orders, strict=True)])),
+        tau=float(np.mean([kendall_tau(o, d.sequence) for d, o in zip(case.test, orders, strict=True)])),
+        answers=learned.answers,
+        cpu_s=spent,
+    )
+
+
+def _hit(learned: Learned, shown: LearningDemonstration, order: Sequence) -> bool:
+    """As in `hits`; without weights the order itself must have the recorded one's features."""
+    if learned.policy is None:
+        return bool(np.allclose(shown.problem.feature_sum(order), shown.problem.feature_sum(shown.sequence), rtol=SAME, atol=SAME))
+    problem = _under(shown.problem, learned.policy)
+    return judge(problem, learned.policy.weights, shown.sequence, order).hit
+
+
+def _under(problem: SequencingProblem, policy: Policy) -> SequencingProblem:
+    return problem if problem.features.name == policy.features else on_features(problem, FEATURE_SETS[policy.features])
+
+
+def _regret(shown: LearningDemonstration, order: Sequence, truth: Array) -> float:
+    best = shortest_sequence(shown.problem, truth).cost
+    return (shown.problem.cost(truth, order) - best) / max(abs(best), 1e-12)
+
+
+def summed(scores: list[Score]) -> list[Line]:
+    """One line per learner and kind, in the order met."""
+    groups: dict[tuple[str, str], list[Score]] = {}
+    for s in scores:
+        groups.setdefault((s.kind, s.learner), []).append(s)
+    return [_line(learner, kind, found) for (kind, learner), found in groups.items()]
+
+
+def _line(learner: str, kind: str, found: list[Score]) -> Line:
+    regrets = [s.regret for s in found if s.regret is not None]
+    hits, tests = sum(s.test_hits for s in found), sum(s.test for s in found)
+    return Line(
+        learner=learner,
+        kind=kind,
+        cases=len(found),
+        train_success=sum(s.train_hits for s in found) / sum(s.train for s in found),
+        test_success=hits / tests,
+        test_hits=hits,
+        test=tests,
+        regret=float(np.mean(regrets)) if regrets else None,
+        tau=float(np.mean([s.tau for s in found])),
+        answers=float(np.mean([s.answers for s in found])),
+        cpu_s=float(np.mean([s.cpu_s for s in found])),
+    )
+
+
+def format_comparison(lines: list[Line]) -> str:
+    """A table per kind."""
+    titles = {"synthetic": "Authors' synthetic tools, published split", "real": "Authors' real tools, one left out at a time"}
+    text: list[str] = []
+    for kind in dict.fromkeys(line.kind for line in lines):
+        rows = [line for line in lines if line.kind == kind]
+        title = titles.get(kind, f"{rows[0].cases} made-up experts of random weights, synthetic tools and split")
+        text += ["", title, "learner                 train   test    hits     regret    tau   answers    cpu s"]
+        text += [_row(line) for line in rows]
+    return "\n".join(text[1:])
+
+
+def _row(line: Line) -> str:
+    regret = "       -" if line.regret is None else f"{line.regret:8.2%}"
+    hits = f"{line.test_hits}/{line.test}"
+    return (
+        f"{line.learner:22s}  {line.train_success:5.0%}  {line.test_success:5.0%}  {hits:>7s}   {regret}  {line.tau:5.2f}"
+        f"  {line.answers:8.1f}  {line.cpu_s:7.2f}"
+    )

@@ -1,0 +1,98 @@
+"""Fig. 5: before and after an expert says where they like to start and end.
+
+All equivalent sequences of a tool cost the same; which one is done is settled by region names until an effort penalty is learned.
+A scripted expert prefers one side; the penalty is learned on the training tools and judged on tools it has not seen.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.learning.effort import EffortParameters, effort_step, start_effort
+from app.learning.effort_features import EFFORT_COLUMNS, effort_penalty
+from app.learning.expert import ScriptedExpert
+from app.learning.performance_state import LearningDemonstration
+from app.learning.qp import Array
+from app.sequencing.classes import CAP, optimal_sequences
+from app.sequencing.shortest import shortest_sequence
+
+LIKED = {"right": "left", "left": "right", "back": "front", "front": "back"}  # far right is an effort for who starts on the left
+SAME = 1e-9
+
+
+@dataclass(frozen=True)
+class SideResult:
+    """One preferred side."""
+
+    preference: str  # "starts left"
+    answers: int
+    trained: "Tally"  # tools asked about
+    unseen: "Tally"
+
+
+@dataclass(frozen=True)
+class Tally:
+    """How often the chosen order has the least effort."""
+
+    tools: int  # on which the preference makes a difference at all
+    before: int  # of these, right without an effort penalty
+    after: int  # of these, right with the learned one
+
+
+def study_effort(
+    trained: list[LearningDemonstration], unseen: list[LearningDemonstration], weights: Array, parameters: EffortParameters | None = None
+) -> list[SideResult]:
+    """Every side, at the start and at the end.
+
+    Args:
+        trained: Tools the expert answers about.
+        unseen: Tools the penalty is judged on.
+        weights: Performance weights, (n + m,).
+        parameters: Of the effort learner.
+
+    Paper: Fig. 5 shows one preference on one tool. "Right" means that of all cheapest sequences the chosen one has the least effort under
+        the expert's own penalty.
+    """
+    parameters = parameters or EffortParameters()
+    return [_side(k, trained, unseen, weights, parameters) for k in range(len(EFFORT_COLUMNS))]
+
+
+def _side(
+    k: int, trained: list[LearningDemonstration], unseen: list[LearningDemonstration], weights: Array, parameters: EffortParameters
+) -> SideResult:
+    end, side = EFFORT_COLUMNS[k][0].split("_")
+    expert = ScriptedExpert(weights, np.eye(len(EFFORT_COLUMNS))[k])
+    learned, answers = _taught(trained, expert, weights, parameters)
+    return SideResult(f"{end}s {LIKED[side]}", answers, *(_tally(part, weights, learned, expert) for part in (trained, unseen)))
+
+
+def _tally(shown: list[LearningDemonstration], weights: Array, learned: Array, expert: ScriptedExpert) -> Tally:
+    told = [o for d in shown if (o := _judged(d, weights, learned, expert)) is not None]
+    return Tally(len(told), sum(b for b, _ in told), sum(a for _, a in told))
+
+
+def _taught(
+    trained: list[LearningDemonstration], expert: ScriptedExpert, weights: Array, parameters: EffortParameters
+) -> tuple[Array, int]:
+    answers: dict[str, str] = {}
+    state = start_effort(trained, weights, parameters, seed=0)
+    while True:
+        result = effort_step(trained, parameters, state, answers)
+        state = result.state
+        for q in result.questions:
+            answers[q.fingerprint] = expert.prefers(trained[q.demonstration].problem, q.left, q.right)
+        if result.outcome != "questions":
+            return result.effort_weights, len(answers)
+
+
+def _judged(shown: LearningDemonstration, weights: Array, learned: Array, expert: ScriptedExpert) -> tuple[bool, bool] | None:
+    """(right before, right after); None when every cheapest sequence is the same effort to the expert."""
+    mine = expert.effort_weights
+    assert mine is not None
+    efforts = [effort_penalty(shown.problem, mine, s) for s in optimal_sequences(shown.problem, weights, CAP).sequences]
+    if max(efforts) - min(efforts) < SAME:
+        return None
+    plain = shortest_sequence(shown.problem, weights).sequence
+    settled = shortest_sequence(shown.problem, weights, lambda s: effort_penalty(shown.problem, learned, s)).sequence
+    least = min(efforts) + SAME
+    return effort_penalty(shown.problem, mine, plain) <= least, effort_penalty(shown.problem, mine, settled) <= least
