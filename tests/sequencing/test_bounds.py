@@ -1,0 +1,89 @@
+"""The bound against the exact optimum, whatever the features, weights and constraints."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from app.geometry.tool import GraphSource
+from app.sequencing.bounds import Prices, evaluate, lower_bound, split
+from app.sequencing.constraints import Constraints, check_order, resolve
+from app.sequencing.features import FEATURE_SETS, Interaction
+from app.sequencing.problem import SequencingProblem, problem_for
+from app.sequencing.shortest import shortest_sequence
+from tests.sequencing.graphs import every_order, grid_graph
+
+sources = st.sampled_from(["mesh", "real", "synthetic"])
+shapes = st.sampled_from([(1, 1), (1, 2), (1, 3), (2, 2), (1, 5), (2, 3), (2, 4)])
+factors = st.sampled_from(["height", "curvature", "orientation", "jump", "gaps_inside", "borders_unfinished"])
+
+
+def weights(problem: SequencingProblem, seed: int, signed: bool) -> np.ndarray:
+    w = np.random.default_rng(seed).normal(size=len(problem.columns))
+    return w if signed else np.abs(w)
+
+
+@given(shapes, st.integers(0, 10_000), sources, st.booleans(), factors, factors, st.booleans())
+@settings(max_examples=120, deadline=None)
+def test_never_above_the_optimum(shape: tuple[int, int], seed: int, source: GraphSource, signed: bool, one: str, two: str, layout: bool):
+    graph = grid_graph(*shape, seed, source)
+    features = FEATURE_SETS["layout"] if layout else problem_for(graph).features
+    problem = SequencingProblem(graph, features, () if layout else (Interaction(one, two), Interaction("height", "curvature")))
+    w = weights(problem, seed, signed)
+    best = float((every_order(problem)[1] @ w).min())
+    bound = lower_bound(problem, w, best + 1.0 + abs(best), steps=40)  # aims above the optimum, to be tempted past it
+    assert bound <= best + 1e-9 * max(1.0, abs(best))
+
+
+@given(shapes, st.integers(0, 10_000), sources, st.booleans())
+@settings(max_examples=60, deadline=None)
+def test_any_prices_give_a_bound(shape: tuple[int, int], seed: int, source: GraphSource, signed: bool):
+    problem, rng = problem_for(grid_graph(*shape, seed, source)), np.random.default_rng(seed)
+    w, n = weights(problem, seed, signed), problem.n
+    parts = split(problem, w, resolve(None, n))
+    prices = Prices(*(rng.normal(size=s) for s in (n, n, n, (len(parts.walks) - 1, n, n))))
+    assert evaluate(parts, prices).bound <= float((every_order(problem)[1] @ w).min()) + 1e-9
+
+
+@given(st.integers(0, 10_000), sources)
+@settings(max_examples=30, deadline=None)
+def test_below_what_constraints_leave(seed: int, source: GraphSource):
+    rng = np.random.default_rng(seed)
+    a, b, c, d, e, f = rng.permutation(7)[:6].tolist()
+    problem = problem_for(grid_graph(1, 7, seed, source))
+    w, resolved = weights(problem, seed, True), resolve(Constraints(before=((a, b),), last=c, skip=(d,), done=(e, f)), 7)
+    free = [x for x in range(7) if x not in (d, e, f)]
+    orders = [rest for rest in itertools.permutations(free) if not check_order((e, f, *rest), resolved)]
+    best = min(rest_cost(problem, w, (e, f), rest) for rest in orders)
+    assert lower_bound(problem, w, best + 1.0, resolved, steps=40) <= best + 1e-9
+
+
+def rest_cost(problem: SequencingProblem, w: np.ndarray, past: tuple[int, ...], rest: tuple[int, ...]) -> float:
+    """Cost of the steps after the finished regions."""
+    done, total = np.zeros((1, problem.n), np.bool_), 0.0
+    done[0, list(past)] = True
+    for a in rest:
+        total += float(problem.values(done)[0, a] @ w)
+        done[0, a] = True
+    return total
+
+
+@pytest.mark.parametrize(("source", "most"), [("mesh", 0.15), ("synthetic", 0.3), ("real", 0.35)])
+def test_close_enough_to_be_of_use_at_twelve_regions(source: GraphSource, most: float):
+    for seed in range(2):
+        problem = problem_for(grid_graph(3, 4, seed, source))
+        w = np.ones(len(problem.columns))
+        best = shortest_sequence(problem, w).cost
+        bound = lower_bound(problem, w, best)
+        assert bound <= best
+        assert (best - bound) / abs(best) < most
+
+
+def test_more_steps_never_hurt_and_stopping_is_heard():
+    problem, w = problem_for(grid_graph(3, 4, 1)), np.ones(13)
+    best = shortest_sequence(problem, w).cost
+    few, many = (lower_bound(problem, w, best, steps=k) for k in (10, 100))
+    assert few <= many <= best
+    assert lower_bound(problem, w, best, should_stop=lambda: True) == lower_bound(problem, w, best, steps=1)
