@@ -86,6 +86,19 @@ def upright_plane(tool: Tool, region: int, first: Array, second: Array) -> Array
     return np.cross(np.asarray(second - first, np.float64), np.asarray(upward, np.float64)).astype(np.float64)
 
 
+def plane_trace(tool: Tool, region: int, point: Array, normal: Array) -> Array:
+    """Segments (S, 2, 3) in which a plane meets a region, metres."""
+    corners = tool.mesh.vertices[tool.mesh.faces[tool.labels == region]]
+    height = (corners - point) @ normal
+    following, after = np.roll(corners, -1, axis=1), np.roll(height, -1, axis=1)
+    crossed = (height < 0) != (after < 0)
+    at = crossed.sum(axis=1) == 2
+    step = np.where(crossed, height / np.where(crossed, height - after, 1), 0)
+    places = corners + step[..., None] * (following - corners)
+    order = np.argsort(~crossed[at], axis=1, kind="stable")[:, :2]
+    return np.take_along_axis(places[at], order[..., None], axis=1)
+
+
 def move_piece(tool: Tool, piece: NDArray[np.bool_], to: int | None) -> Edited:
     """Give the faces `piece` (F,) of one region to another one that they touch, or make them a region (None).
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from app.geometry.tool import Tool
 from app.robot.playback import Playback
-from app.workflow import record, robot, sessions, tools
+from app.workflow import editing_views, record, robot, sessions, tools
 from app.workflow.context import Context
 
 Json = dict[str, Any]
@@ -21,7 +21,10 @@ class Actions:
     get_draft: Callable[[str], Json]
     tool_value: Callable[[str], Tool]
     playback_value: Callable[[str], Playback]
-    pick: Callable[[str, int], Any]
+    tool_state: Callable[[str], Json]
+    piece_faces: Callable[[str], Any]
+    pick: Callable[..., Any]
+    select: Callable[[str, list[int]], Any]
     command: Callable[[str, str], Any]
     subscribe: Callable[[Callable[[Any], None]], Callable[[], None]]
 
@@ -33,7 +36,10 @@ def workflow_actions(ctx: Context) -> Actions:
         get_draft=partial(record.get_draft, ctx),
         tool_value=partial(tools.tool_value, ctx),
         playback_value=partial(robot.playback_value, ctx),
+        tool_state=lambda tool_id: tools.get_tool(ctx, tool_id)["edit"],
+        piece_faces=partial(editing_views.piece_faces, ctx),
         pick=partial(sessions.pick_in_view, ctx),
+        select=partial(editing_views.add_regions, ctx),
         command=partial(sessions.command_in_view, ctx),
         subscribe=ctx.store.subscribe,
     )

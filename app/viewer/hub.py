@@ -4,15 +4,16 @@ import asyncio
 import logging
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Annotated, Any
 
 from fastapi import APIRouter, HTTPException, Request, Response, WebSocket
+from pydantic import BaseModel, Field
 
 from app.errors import NotFound
 from app.viewer.actions import Actions, workflow_actions
 from app.viewer.bridge import TOO_MANY, host_is_local, origin_is_ours, pump, viser_subprotocol
 from app.viewer.page import PARAMETERS, POLICY, viewer_page
-from app.viewer.view import Refresh, View
+from app.viewer.view import Hover, Refresh, View
 from app.workflow.context import Context
 
 log = logging.getLogger(__name__)
@@ -20,6 +21,13 @@ log = logging.getLogger(__name__)
 MOST_VIEWS = 40
 IDLE_SECONDS = 15 * 60.0  # a view nobody looks at is kept this long
 REAP_SECONDS = 30.0
+
+
+class Place(BaseModel):
+    """Where on the canvas: 0 to 1 from the left and from the top; null: nowhere."""
+
+    x: Annotated[float, Field(ge=0, le=1)] | None = None
+    y: Annotated[float, Field(ge=0, le=1)] | None = None
 
 
 class Hub:
@@ -37,6 +45,7 @@ class Hub:
         self._unsubscribe: Callable[[], None] = lambda: None
         self.router = APIRouter(include_in_schema=False)
         self.router.add_api_route("/v/{sid}/", self.page, methods=["GET"])
+        self.router.add_api_route("/v/{sid}/under", self.under, methods=["POST"])
         self.router.add_api_websocket_route("/v/{sid}", self.socket)
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
@@ -68,6 +77,16 @@ class Hub:
         if "gzip" in request.headers.get("accept-encoding", ""):
             return Response(packed, media_type="text/html", headers=headers | {"Content-Encoding": "gzip"})
         return Response(plain, media_type="text/html", headers=headers)
+
+    async def under(self, sid: str, place: Place) -> dict[str, Any]:
+        """What lies under the pointer at a place of the canvas; it is outlined in the view."""
+        view = self._views.get(sid)
+        if view is None:
+            raise HTTPException(404, "This 3D view is not open.")
+        if place.x is None or place.y is None:
+            view.submit(Hover(None))
+            return {"region": None, "on_body": False, "point_mm": None}
+        return await asyncio.to_thread(view.under, place.x, place.y)
 
     async def socket(self, sid: str, browser: WebSocket) -> None:
         """The browser's connection to its view. A refusal comes before the handshake, so the browser sees HTTP 403."""
@@ -152,6 +171,11 @@ class Hub:
         data = event.data
         if event.type == "scene.changed" and data.get("closed") and data["session_id"] in self._views:
             self._drop(data["session_id"])
+            return
+        if event.type == "session.hovered":
+            view = self._views.get(data["session_id"])
+            if view is not None:
+                view.submit(Hover(data["region"]))
             return
         for view in self._views.values():
             about_tool = event.type in ("draft.changed", "tool.changed") and data.get("tool_id") == view.tool_id

@@ -113,7 +113,12 @@ def ramp(n: int, dark: bool) -> tuple[Rgb, ...]:
 
 def faded(colour: Rgb, dark: bool) -> Rgb:
     """`colour` mixed in OKLab with the surface colour, as for regions that don't matter to a question."""
-    return from_oklab((1 - FADE) * oklab(colour) + FADE * oklab(rgb(theme(dark).surface)))
+    return mixed(colour, rgb(theme(dark).surface), FADE)
+
+
+def mixed(colour: Rgb, other: Rgb, share: float) -> Rgb:
+    """Two colours mixed in OKLab, `share` of the other."""
+    return from_oklab((1 - share) * oklab(colour) + share * oklab(other))
 
 
 def tint_choice(neighbour: NDArray[np.bool_], tints: int = 8) -> tuple[int, ...]:

@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from app.viewer.palette import Rgb, faded, ramp, rgb, theme
+from app.viewer.palette import Rgb, faded, mixed, ramp, rgb, theme
 
-Outline = Literal["current", "differs", "conflict"]
+Outline = Literal["current", "differs", "conflict", "selected", "hover"]
+SELECTED_SHARE = 0.45  # of the signal colour in a selected region
 
 
 @dataclass(frozen=True)
@@ -17,6 +18,7 @@ class RegionLook:
     text: str
     plate: bool  # a number on a white plate; otherwise the text is printed on the surface
     outline: Outline | None = None
+    visible: bool = True
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,10 @@ class Progress:
     differs: frozenset[int] = frozenset()  # when not empty, all other regions are faded
     highlight: frozenset[int] = frozenset()
     troubled: frozenset[int] = frozenset()  # regions the robot has problems with
+    selected: frozenset[int] = frozenset()  # while regions are edited
+    hover: int | None = None  # region under the pointer
+    locked: frozenset[int] = frozenset()
+    hidden: frozenset[int] = frozenset()
 
 
 def paint(progress: Progress, names: Sequence[str], tints: Sequence[int], dark: bool) -> Picture:
@@ -50,13 +56,18 @@ def paint(progress: Progress, names: Sequence[str], tints: Sequence[int], dark: 
     for region, name in enumerate(names):
         step = place.get(region)
         colour = rgb(tint[tints[region] % len(tint)]) if step is None else colours[step]
+        if region in progress.locked:
+            colour = rgb(theme(dark).body)
+        if region in progress.selected:
+            colour = mixed(colour, rgb(theme(dark).current), SELECTED_SHARE)
         quiet = bool(progress.differs) and region not in progress.differs
         looks.append(
             RegionLook(
                 colour=faded(colour, dark) if quiet else colour,
-                text=name if step is None else str(step + 1),
+                text=_text(name, step, region in progress.locked),
                 plate=step is not None and not quiet,
                 outline=_outline(region, progress),
+                visible=region not in progress.hidden,
             )
         )
     return Picture(dark, tuple(looks))
@@ -67,7 +78,17 @@ def _outline(region: int, progress: Progress) -> Outline | None:
         return "differs"
     if region == progress.current and not progress.differs:
         return "current"
+    if region in progress.selected:
+        return "selected"
+    if region == progress.hover:
+        return "hover"
     return "conflict" if region in progress.troubled else None
+
+
+def _text(name: str, step: int | None, locked: bool) -> str:
+    if step is not None:
+        return str(step + 1)
+    return f"{name} locked" if locked else name
 
 
 def sequence_progress(sequence: Sequence[int], step: int | None, differs: Sequence[int] = (), highlight: Sequence[int] = ()) -> Progress:

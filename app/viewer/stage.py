@@ -1,7 +1,8 @@
 """The viser side of a view: its server, lights, grid, part, labels and outlines."""
 
-from collections.abc import Awaitable, Callable, Coroutine
-from typing import Any
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 import viser
@@ -20,7 +21,21 @@ LETTER_HEIGHT = 0.036  # of the part's diagonal
 EDGE_WIDTH, OUTLINE_WIDTH, CASING_WIDTH = 2.0, 4.5, 7.5  # px; shaders.py tells them apart by these
 LIFT, LABEL_LIFT = 0.001, 0.012  # above the surface, of the part's diagonal
 
-PickRegion = Callable[[int], Awaitable[None]]
+Modifier = Literal["shift", "cmd/ctrl"] | None
+MODIFIERS: tuple[Modifier, ...] = (None, "shift", "cmd/ctrl")
+
+
+@dataclass(frozen=True)
+class Clicked:
+    """A click on a region, or on the part beside the regions (None), and its ray in the tool frame."""
+
+    region: int | None
+    origin: tuple[float, float, float]
+    direction: tuple[float, float, float]
+    modifier: bool
+
+
+OnClick = Callable[[Clicked], Awaitable[None]]
 
 
 def open_server() -> viser.ViserServer:
@@ -37,7 +52,7 @@ def open_server() -> viser.ViserServer:
 class Stage:
     """Nodes of one tool. Built anew for another tool; repainted by differences."""
 
-    def __init__(self, server: viser.ViserServer, on_click: PickRegion) -> None:
+    def __init__(self, server: viser.ViserServer, on_click: OnClick) -> None:
         self.server = server
         self._on_click = on_click
         self._clear()
@@ -116,11 +131,12 @@ class Stage:
         scene, span = self.server.scene, size(tool)
         rest = tool.mesh.faces[tool.labels < 0]
         if len(rest):
-            self._add_mesh("/tool/body", *part_of(tool.mesh, rest), rgb(colours.body), flat_shading=True)
+            body = self._add_mesh("/tool/body", *part_of(tool.mesh, rest), rgb(colours.body), flat_shading=True)
+            self._listen(body, None)
         for region in range(tool.n):
             vertices, faces = part_of(tool.mesh, tool.mesh.faces[tool.labels == region])
             mesh = self._add_mesh(f"/tool/r{region:03d}", vertices, faces, rgb(colours.body))
-            mesh.on_click(self._clicked(region))
+            self._listen(mesh, region)
             self._regions.append(mesh)
         borders = all_borders(tool, LIFT * span)
         if len(borders):
@@ -132,11 +148,12 @@ class Stage:
             name, vertices, faces, color=colour, side="double", flat_shading=flat_shading, cast_shadow=False, receive_shadow=False
         )
 
-    def _clicked(self, region: int) -> Callable[[object], Coroutine[Any, Any, None]]:
-        async def clicked(_event: object) -> None:  # async: viser keeps these in order; plain callbacks overtake each other
-            await self._on_click(region)
+    def _listen(self, mesh: viser.MeshHandle, region: int | None) -> None:
+        async def clicked(event: Any) -> None:  # async: viser keeps these in order; plain callbacks overtake each other
+            await self._on_click(Clicked(region, event.ray_origin, event.ray_direction, event.modifier is not None))
 
-        return clicked
+        for modifier in MODIFIERS:
+            mesh.on_click(modifier=modifier)(clicked)
 
     def _add_labels(self, tool: Tool, dark: bool, plate: float) -> None:
         span = size(tool)
@@ -158,10 +175,11 @@ class Stage:
 
     def _paint_region(self, region: int, new: RegionLook) -> None:
         self._regions[region].color = new.colour
+        self._regions[region].visible = new.visible
         for label, wanted in ((self._labels[region], new.plate), (self._letters[region], not new.plate)):
             if wanted:
                 label.text = new.text
-            label.visible = wanted
+            label.visible = wanted and new.visible
 
     def _draw_outlines(self, picture: Picture) -> None:
         """Thick lines on a casing of the surface's colour around outlined regions."""
@@ -169,7 +187,7 @@ class Stage:
         for node in self._outlines:
             node.remove()
         self._outlines = []
-        outlined = [region for region, look in enumerate(picture.regions) if look.outline]
+        outlined = [region for region, look in enumerate(picture.regions) if look.outline and look.visible]
         if not outlined:
             return
         points = np.concatenate([self._rims[region] for region in outlined])
@@ -182,11 +200,19 @@ class Stage:
 
 
 def _outlines(picture: Picture) -> tuple[str | None, ...]:
-    return tuple(look.outline for look in picture.regions)
+    return tuple(look.outline if look.visible else None for look in picture.regions)
 
 
 def _outline_colour(look: RegionLook, colours: Theme) -> Rgb:
-    return rgb({"current": colours.current, "differs": colours.differs, "conflict": colours.conflict}[look.outline or "current"])
+    return rgb(
+        {
+            "current": colours.current,
+            "differs": colours.differs,
+            "conflict": colours.conflict,
+            "selected": colours.current,
+            "hover": colours.label_ink,
+        }[look.outline or "current"]
+    )
 
 
 def _vertex_colour(colour: Rgb) -> NDArray[np.uint8]:

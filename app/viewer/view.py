@@ -19,10 +19,13 @@ from app.geometry.tool import Tool
 from app.robot.playback import Playback
 from app.viewer.actions import Actions, Json
 from app.viewer.arm import Arm, ground, progress_at, room_needed
+from app.viewer.marks import NOTHING, MarkNodes, marks_of
 from app.viewer.palette import tint_choice
 from app.viewer.picture import Progress, draft_progress, paint, sequence_progress
+from app.viewer.pointer import Background, Box, Pointer
 from app.viewer.projection import camera_for
-from app.viewer.stage import Stage, open_server
+from app.viewer.rays import first_hit, ray_through, regions_in_box
+from app.viewer.stage import Clicked, Stage, open_server
 
 log = logging.getLogger(__name__)
 
@@ -35,10 +38,10 @@ LETTERS: tuple[Letters, ...] = get_args(Letters)
 
 
 @dataclass(frozen=True)
-class Pick:
-    """A click on a region."""
+class Hover:
+    """The pointer, or the row of a table, is on a region."""
 
-    region: int
+    region: int | None
 
 
 @dataclass(frozen=True)
@@ -60,7 +63,7 @@ class Refresh:
     """Something stored has changed."""
 
 
-Task = Pick | Letter | Command | Refresh
+Task = Clicked | Box | Background | Hover | Letter | Command | Refresh
 
 
 @dataclass(frozen=True)
@@ -84,6 +87,14 @@ def same_shape(one: Tool | None, other: Tool | None) -> bool:
     return np.array_equal(one.labels, other.labels) and np.array_equal(one.mesh.vertices, other.mesh.vertices)
 
 
+def same_place(one: Tool | None, other: Tool | None) -> bool:
+    """Whether both fill the same box, so that the camera may stay: the regions of a tool were edited, not the tool changed."""
+    if one is None or other is None:
+        return one is other
+    ends = [(t.mesh.vertices.min(0), t.mesh.vertices.max(0)) for t in (one, other)]
+    return np.allclose(ends[0], ends[1], rtol=0, atol=1e-9)
+
+
 class View:
     """A viser server, what it shows, and the queue of what is to be done."""
 
@@ -101,9 +112,13 @@ class View:
         self._playback: Playback | None = None
         self._playback_shown: str | None = None
         self._arm: Arm | None = None
+        self._hover: int | None = None
+        self._marked: tuple[frozenset[int], frozenset[int]] = (frozenset(), frozenset())  # locked, hidden
         self._clock = Clock()
         self.server = open_server()
         self.stage = Stage(self.server, self._clicked)
+        self._pointer = Pointer(self.server, self.submit)
+        self._marks = MarkNodes(self.server)
         self._add_hotkeys()
         self._task: asyncio.Task[None] | None = None
         self._closed = False
@@ -127,8 +142,8 @@ class View:
         with contextlib.suppress(RuntimeError):  # the loop has ended: nobody is looking any more
             self._loop.call_soon_threadsafe(self._queue.put_nowait, command)
 
-    async def _clicked(self, region: int) -> None:
-        self.submit(Pick(region))
+    async def _clicked(self, clicked: Clicked) -> None:
+        self.submit(clicked)
 
     def _add_hotkeys(self) -> None:
         add = self.server.gui.add_command
@@ -194,15 +209,18 @@ class View:
     def do(self, command: Task | None) -> None:
         """Carry out a command; None advances a running recording."""
         match command:
-            case Pick(region):
-                if self._tool is not None and region < self._tool.n:
-                    self._actions.pick(self.sid, region)
+            case Clicked() | Background() | Box():
+                if self._tool is not None:
+                    self._pointed(self._tool, command)
+            case Hover(region):
+                self._hover = region
+                self._advance()
             case Letter(letter):
                 named = [region for region, its in enumerate(self._tool.regions) if its.name == letter] if self._tool else []
                 if named:
                     self._actions.pick(self.sid, named[0])
             case Command(name):
-                if self._scene.get("mode") == "record":
+                if self._scene.get("mode") in ("record", "edit"):
                     self._actions.command(self.sid, name)
             case Refresh():
                 self.refresh()
@@ -225,17 +243,28 @@ class View:
         tool = self._actions.tool_value(tool_id) if tool_id and mode != "empty" else None
         playback = self._recording(playback_id) if playback_id and mode == "robot" else None
         moved = not same_shape(tool, self._tool) or playback is not self._playback
+        away = playback is not self._playback or not same_place(tool, self._tool)
         if moved or dark != self._dark:
             self._tool = None  # nothing to paint on, should the building fail
+            self._marks.forget()
             self.stage.build(tool, dark, ground(playback) if playback is not None else None)
             self._arm = Arm(self.server, playback, dark) if playback is not None else None
         if tool is not None:
             self._tints = tint_choice(tool.graph.neighbour)
-            if moved:
+            if away:
                 middle = tool.mesh.vertices.mean(0)
                 self.stage.place_camera(camera_for(tool, room_needed(playback, middle) if playback is not None else None))
         self._tool, self._playback, self._dark = tool, playback, dark
         self._playback_shown = playback_id
+        self._pointer.listen(mode == "edit")
+        if mode == "edit":
+            state = self._actions.tool_state(self._scene["tool_id"])
+            self._marked = frozenset(state["locked"]), frozenset(state["hidden"])
+        else:
+            self._hover = None
+        if tool is not None:
+            piece = self._actions.piece_faces(self.sid) if mode == "edit" and self._scene.get("points") else None
+            self._marks.draw(tool, marks_of(tool, self._scene, piece) if mode == "edit" else NOTHING, dark)
 
     def _recording(self, playback_id: str) -> Playback | None:
         """The robot's recording; None while it is still being computed, which its page tells."""
@@ -266,11 +295,45 @@ class View:
         mode = scene["mode"]
         if mode == "record":
             return draft_progress(self._actions.get_draft(scene["tool_id"])["sequence"], highlight)
+        if mode == "edit":
+            locked, hidden = self._marked
+            return Progress(selected=frozenset(scene["selection"]), hover=self._hover, locked=locked, hidden=hidden)
         if mode == "robot" and self._playback is not None:
             return progress_at(self._playback, now)
         if mode in ("sequence", "robot"):
             return sequence_progress(scene.get("sequence") or (), scene.get("step"), scene.get("differs") or (), highlight)
         return Progress(highlight=frozenset(highlight))
+
+    def _pointed(self, tool: Tool, event: Clicked | Background | Box) -> None:
+        """A click or a box in the view."""
+        editing = self._scene.get("mode") == "edit"
+        if isinstance(event, Box):
+            found = regions_in_box(tool, event.camera, event.aspect, event.low, event.high)
+            self._actions.select(self.sid, [region for region in found if region not in self._marked[1]])
+        elif isinstance(event, Background):
+            if first_hit(tool.mesh, np.array(event.origin), np.array(event.direction)) is None:
+                self._actions.pick(self.sid, None)
+        elif not editing:
+            if event.region is not None and event.region < tool.n:
+                self._actions.pick(self.sid, event.region)
+        elif event.region is None or event.region < tool.n:
+            among = tool.labels == (-1 if event.region is None else event.region)
+            hit = first_hit(tool.mesh, np.array(event.origin), np.array(event.direction), among)
+            point = None if hit is None else (hit[1] * 1e3).tolist()
+            self._actions.pick(self.sid, event.region, point, modifier=event.modifier)
+
+    def under(self, x: float, y: float) -> Json:
+        """What a browser sees at a place of its canvas (0 to 1, y down); it is outlined, too."""
+        tool, camera = self._tool, self._pointer.camera()
+        hit = None
+        if tool is not None and camera is not None:
+            hidden = np.isin(tool.labels, list(self._marked[1])) if self._scene.get("mode") == "edit" else np.zeros(len(tool.labels), bool)
+            hit = first_hit(tool.mesh, *ray_through(camera[0], x, y, camera[1]), ~hidden)
+        region = int(tool.labels[hit[0]]) if tool is not None and hit is not None else -1
+        found = region if region >= 0 else None
+        if found != self._hover:
+            self.submit(Hover(found))
+        return {"region": found, "on_body": hit is not None and found is None, "point_mm": (hit[1] * 1e3).tolist() if hit else None}
 
     def notify(self, sentence: str) -> None:
         """Tell everybody who looks."""

@@ -151,7 +151,7 @@ def _reassign(before: Before, edit: Json) -> After:
     to = None if wish == "new" else piece.to if wish is None else int(wish)
     if to is not None and not 0 <= to < tool.n:
         raise InvalidInput(f"There is no region {to}; this tool has {tool.n}, numbered from 0.")
-    if to == piece.region:
+    if to is not None and to == piece.region:
         raise InvalidInput(f"This piece belongs to {names_of(tool, [to])} already.")
     edited = editing.move_piece(tool, piece.faces, to)
     here = names_of(tool, [piece.region])

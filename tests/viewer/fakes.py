@@ -51,6 +51,8 @@ class FakeWorkflow:
     scene: dict[str, Any] = field(default_factory=lambda: {"mode": "record", "tool_id": "t1"})
     running: dict[str, Any] = field(default_factory=lambda: {"playing": False, "time": 0.0, "speed": 1.0, "duration": None})
     picked: list[tuple[str, int]] = field(default_factory=list)
+    state: dict[str, Any] = field(default_factory=lambda: {"locked": [], "hidden": []})
+    points: list[Any] = field(default_factory=list)
     listeners: list[Callable[[Event], None]] = field(default_factory=list)
 
     def get_session(self, sid: str) -> dict[str, Any]:
@@ -58,13 +60,21 @@ class FakeWorkflow:
             raise NotFound(f"There is no view with the id {sid!r}.")
         return {"id": sid, "scene": self.scene, "playback": self.running}
 
-    def pick(self, sid: str, region: int) -> None:
+    def pick(self, sid: str, region: int | None, point_mm: list[float] | None = None, *, modifier: bool = False) -> None:
+        if self.scene["mode"] == "edit":
+            self.points.append((region, point_mm, modifier))
+            return
+        assert region is not None
         self.picked.append((sid, region))
         if region in self.draft:
             raise InvalidInput("This region already has its number.")
         time.sleep(0.001)  # the real one waits for a commit
         self.draft.append(region)
         self.tell("draft.changed", tool_id="t1")
+
+    def select(self, _sid: str, regions: list[int]) -> None:
+        self.scene = {**self.scene, "selection": sorted({*self.scene["selection"], *regions})}
+        self.tell("scene.changed", session_id="s1")
 
     def command(self, _sid: str, name: str) -> None:
         if name == "undo" and self.draft:
@@ -94,7 +104,10 @@ class FakeWorkflow:
             get_draft=lambda _tool: {"sequence": list(self.draft)},
             tool_value=lambda _tool: self.tool,
             playback_value=self.recording,
+            tool_state=lambda _tool: self.state,
+            piece_faces=lambda _sid: None,
             pick=self.pick,
+            select=self.select,
             command=self.command,
             subscribe=self.subscribe,
         )
