@@ -13,6 +13,7 @@
 // never builds a queue; changes of what is edited are merged until they can go, always after the scene they belong to. The theme goes along as `dark`.
 
 import { get, patch, post, put } from "./api.js";
+import { BoxDrag } from "./boxdrag.js";
 import { h } from "./dom.js";
 import { listen } from "./events.js";
 import { adopt } from "./keys.js";
@@ -32,6 +33,7 @@ export class View3D {
     this.sending = false;
     this.sent = "";
     this.under = null;
+    this.drag = new BoxDrag();
     this.ready = this.open().catch((error) => this.fail(error));
     addEventListener("themechange", () => this.scene && this.show(this.scene, this.sentence));
     listen("resync", () => {
@@ -62,6 +64,7 @@ export class View3D {
   loaded() {
     adopt(this.frame.contentWindow);
     this.under?.attach(this.frame, this.session.id);
+    this.drag.attach(this.frame);
     this.box.querySelector(".view3d-wait")?.remove();
     this.frame.classList.add("shown");
   }
@@ -119,6 +122,11 @@ export class View3D {
   onEditing(handler) {
     this.told = handler;
     return listen("session.editing", (state) => state.session_id === this.session?.id && !this.changes && handler(state));
+  }
+
+  // A plain drag draws a box around regions instead of turning the view.
+  boxing(on) {
+    this.drag.on = on;
   }
 
   onUnder(handler) {

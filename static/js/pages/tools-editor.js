@@ -14,6 +14,7 @@ export class Editor {
     this.view = null;
     this.tool = null;
     this.regions = [];
+    this.wanted = []; // the selection, before what is not known is left out
     this.mode = "select";
     this.rows = 2;
     this.columns = 3;
@@ -51,17 +52,23 @@ export class Editor {
     const other = tool.id !== this.tool?.id;
     this.tool = tool;
     this.regions = regions;
-    this.selection = this.selection.filter((id) => id < regions.length);
-    if (!other) return;
-    Object.assign(this, NOTHING, { mode: "select", fault: "", to: null, hovered: null });
+    if (!other) return this.keep();
+    this.wanted = [];
+    return Object.assign(this, NOTHING, { mode: "select", fault: "", to: null, hovered: null });
+  }
+
+  // The server may tell of a selection before the regions it is about have been read: what is not known yet waits.
+  keep() {
+    this.selection = this.wanted.filter((id) => id < this.regions.length);
   }
 
   // The view's state, told by the server.
   take(state) {
     const before = this.points.length;
     const shown = JSON.stringify([this.selection, this.points, this.level]);
-    for (const key of ["selection", "points", "level"]) if (state[key] !== undefined) this[key] = state[key];
-    this.selection = this.selection.filter((id) => id < this.regions.length);
+    for (const key of ["points", "level"]) if (state[key] !== undefined) this[key] = state[key];
+    if (state.selection) this.wanted = state.selection;
+    this.keep();
     if ("piece" in state) this.piece = state.piece && { ...state.piece, name: this.region(state.piece.region)?.name ?? "A patch outside the working surface" };
     if (shown !== JSON.stringify([this.selection, this.points, this.level])) this.fault = "";
     this.onChange();
@@ -71,6 +78,7 @@ export class Editor {
 
   change(values) {
     Object.assign(this, values);
+    if (values.selection) this.wanted = values.selection;
     this.fault = "";
     this.tell(values);
     this.onChange();
@@ -102,6 +110,7 @@ export class Editor {
     const { pointing, path = null, atOnce } = MODES[name];
     const same = this.mode === name;
     this.mode = name;
+    this.view?.boxing(Boolean(MODES[name].box));
     if (atOnce && !this.missing) return this.act();
     if (same && pointing === "select") return this.change({});
     this.to = null;
@@ -143,7 +152,7 @@ export class Editor {
       return;
     }
     const done = await this.edit(mode.edit(this), mode.words(this) || mode.name);
-    if (done && mode.atOnce) this.enter("select");
+    if (done && mode.once) this.enter("select");
   }
 
   async edit(edit, words) {

@@ -6,8 +6,8 @@ import { fill, h } from "../dom.js";
 import { icon } from "../icons.js";
 import { complain, toast } from "../toasts.js";
 import { ago, plural } from "../words.js";
-
-const LEVELS = { info: ["info", ""], repaired: ["check", "ok"], refused: ["warn", "warn"], warning: ["warn", "warn"] };
+import { readAgain } from "./import_questions.js";
+import { reportList } from "./import_report.js";
 
 export class History {
   constructor(editor) {
@@ -42,14 +42,14 @@ export class History {
       h("i.stop", { "aria-hidden": "true" }), h("span.words", {}, item.words), h("small", {}, facts)));
   }
 
+  // A form that is being filled in is not replaced.
   drawReport() {
-    const lines = this.editor.tool.report;
-    fill(this.report, lines.length ? [h("h3.report-title", {}, "How it was read"), reportList(lines)] : null);
+    const { tool } = this.editor;
+    const key = `${tool.id} ${tool.version}`;
+    if (this.reported === key && this.report.querySelector("details[open]")) return;
+    this.reported = key;
+    fill(this.report, tool.report.length ? [h("h3.report-title", {}, "How it was read"), reportList(tool.report)] : null, readAgain(tool));
   }
-}
-
-export function reportList(lines) {
-  return h("ul.report", {}, lines.map((line) => h("li", {}, icon(...(LEVELS[line.level] ?? LEVELS.info)), h("span", {}, line.text))));
 }
 
 // Demonstrations of the tool that wait on an older cut: why, and one button that carries all that can be carried.

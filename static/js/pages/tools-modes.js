@@ -18,18 +18,19 @@ function pieceWords({ piece }) {
 }
 
 // Every mode: pointing (see the scene of a session), hint(editor), missing(editor): why it can't act yet or "", words of the
-// button, edit(editor). `at once`: acts as soon as it is chosen if nothing is missing.
+// button, edit(editor). `atOnce`: acts as soon as it is chosen if nothing is
+// missing; `once`: is left when it is done.
 export const MODES = {
   select: {
     name: "Select", icon: "pointer", letter: "s", pointing: "select",
     hint: () => "Click a region. Shift-click adds one, Shift-drag draws a box around several.",
   },
   box: {
-    name: "Box select", short: "Box", icon: "box", letter: "b", pointing: "box",
+    name: "Box select", short: "Box", icon: "box", letter: "b", pointing: "select", box: true,
     hint: () => "Drag a box around regions. The view stands still meanwhile.",
   },
   merge: {
-    name: "Merge", icon: "merge", letter: "m", pointing: "select", atOnce: true, tip: "Make one region of several that touch",
+    name: "Merge", icon: "merge", letter: "m", pointing: "select", atOnce: true, once: true, tip: "Make one region of several that touch",
     hint: (e) => (e.selection.length < 2 ? "Click a region, then Shift-click those that should become one with it." : `${few(e)} become one region.`),
     missing: (e) => (e.selection.length < 2 ? "Select two or more regions that touch" : ""),
     words: (e) => `Merge ${few(e)}`,
@@ -43,7 +44,7 @@ export const MODES = {
     edit: (e) => ({ kind: "split_plane", region: e.points[0].region, points_mm: points(e).slice(-2) }),
   },
   grid: {
-    name: "Grid", icon: "grid", letter: "g", pointing: "select", tip: "Cut regions into rows and columns",
+    name: "Grid", icon: "grid", letter: "g", pointing: "select", once: true, tip: "Cut regions into rows and columns",
     hint: (e) => (e.selection.length ? `${few(e)} will be cut into even patches, aligned with each other.` : "Click the regions to cut into rows and columns."),
     missing: (e) => (!e.selection.length ? "Select at least one region" : e.rows * e.columns < 2 ? "One row and one column cut nothing" : ""),
     words: (e) => `Cut into ${e.rows} \u00d7 ${e.columns}`,
@@ -71,14 +72,14 @@ export const MODES = {
     edit: (e) => ({ kind: "working", on: e.points.at(-1).region === null, points_mm: points(e).slice(-1) }),
   },
   lock: {
-    name: "Lock", icon: "lock", letter: "l", pointing: "select", atOnce: true, tip: "Nothing changes a locked region",
+    name: "Lock", icon: "lock", letter: "l", pointing: "select", atOnce: true, once: true, tip: "Nothing changes a locked region",
     hint: (e) => (e.selection.length ? `${few(e)} selected.` : "Click the regions that should stay as they are."),
     missing: (e) => (e.selection.length ? "" : "Select at least one region"),
     words: (e) => `${chosen(e, "locked") ? "Unlock" : "Lock"} ${few(e)}`,
     edit: (e) => ({ kind: "lock", regions: e.selection, on: !chosen(e, "locked") }),
   },
   hide: {
-    name: "Hide", icon: "hide", letter: "h", pointing: "select", atOnce: true, tip: "Look behind a region; it stays in the tool",
+    name: "Hide", icon: "hide", letter: "h", pointing: "select", atOnce: true, once: true, tip: "Look behind a region; it stays in the tool",
     hint: (e) => (e.selection.length ? `${few(e)} selected.` : "Click the regions that are in the way. They stay part of the tool."),
     missing: (e) => (e.selection.length ? "" : "Select at least one region"),
     words: (e) => `${chosen(e, "hidden") ? "Show" : "Hide"} ${few(e)}`,

@@ -5,8 +5,9 @@ import { fill, h } from "../dom.js";
 import { icon } from "../icons.js";
 import { plural } from "../words.js";
 import { importQuestions } from "./import_questions.js";
+import { reportList } from "./import_report.js";
 import { CutPanel } from "./tools-cut.js";
-import { History, OldDemonstrations, reportList } from "./tools-history.js";
+import { History, OldDemonstrations } from "./tools-history.js";
 import { RegionTable } from "./tools-regions.js";
 
 export class ToolPanel {

@@ -153,15 +153,18 @@ export class RegionTable {
     const chosen = selection.length ? selection.map((id) => regions[id]) : regions;
     const area = `${number(chosen.reduce((sum, region) => sum + region.area_mm2, 0) / 100)} cm\u00b2`;
     const hidden = regions.filter((region) => region.hidden).map((region) => region.id);
+    this.facts.classList.toggle("beside", hidden.length > 0);
     fill(this.facts, one ? this.factsOf(one) : h("p", {}, selection.length ? `${regionNames(this.editor, selection)}: ` : `${plural(regions.length, "region")}, `, h("b", {}, area), selection.length ? "" : " of working surface"),
       hidden.length ? h("button.btn.quiet.small", { type: "button", dataset: { key: "show-all" }, onclick: () => this.editor.edit({ kind: "hide", regions: hidden, on: false }, "Show all") }, icon("eye"), `Show ${plural(hidden.length, "hidden region")}`) : null);
   }
 
   factsOf(region) {
     const tilt = (Math.acos(Math.max(-1, Math.min(1, region.normal[2]))) * 180) / Math.PI;
-    const radius = Math.abs(region.curvature_per_m) > 1e-3 ? `, radius ${number(1000 / Math.abs(region.curvature_per_m))} mm` : "";
-    const border = region.perimeter_mm === undefined ? "" : `, border ${number(region.perimeter_mm / 10)} cm of which ${number(region.free_border_mm / 10)} cm free`;
+    const round = ["cylinder", "sphere"].includes(region.kind) && Math.abs(region.curvature_per_m) > 1e-3;
+    const shape = `${region.kind}${round ? `, radius ${number(1000 / Math.abs(region.curvature_per_m))} mm` : ""}, tilted ${number(tilt, 2)}\u00b0`;
+    const border = region.perimeter_mm === undefined ? "" : `Border ${number(region.perimeter_mm / 10)} cm, ${number(region.free_border_mm / 10)} cm free; `;
     const touches = region.neighbours.length ? `touches ${regionNames(this.editor, region.neighbours)}` : "touches no other region";
-    return [h("p", {}, h("b", {}, region.name), ` ${region.kind}${radius}, tilted ${number(tilt, 2)}\u00b0${border}`), h("p", {}, `Middle at ${region.centroid_mm.map((x) => number(x)).join(", ")} mm, ${touches}`)];
+    const middle = `Middle at ${region.centroid_mm.map((x) => number(x)).join(", ")} mm`;
+    return [h("p", { dataset: { tip: middle } }, h("b", {}, region.name), ` ${shape}`), h("p", { onpointerenter: tipWhenCut }, border ? border + touches : touches)];
   }
 }

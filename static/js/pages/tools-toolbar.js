@@ -108,7 +108,7 @@ export class Toolbar {
     const { editor } = this;
     const mode = MODES[editor.mode];
     const { missing } = editor;
-    const cancel = h("button.btn.quiet.small", { type: "button", dataset: { key: "cancel" }, onclick: () => editor.enter("select") }, mode.words(editor) || missing ? "Cancel" : "Done", h("kbd", {}, "Esc"));
+    const cancel = h("button.btn.quiet.small", { type: "button", dataset: { key: "cancel" }, onclick: () => editor.enter("select") }, editor.mode === "surface" ? "Done" : "Cancel", h("kbd", {}, "Esc"));
     const act = mode.edit && editor.mode !== "surface"
       ? h(`button.btn.small${missing ? "" : ".primary"}`, { type: "button", "aria-disabled": missing ? "true" : null, dataset: { key: "act", tip: missing }, onclick: () => editor.act() }, missing ? mode.name : mode.words(editor), missing ? null : h("kbd", {}, "Enter"))
       : null;
