@@ -14,8 +14,8 @@ from app.geometry.tool import Array
 from app.sequencing.beam import beam
 from app.sequencing.constraints import Resolved, resolve
 from app.sequencing.problem import SequencingProblem
-from app.sequencing.transitions import Model, model_of
-from app.sequencing.window import Order, order_cost, reinsert
+from app.sequencing.transitions import Model, is_compiled, model_of
+from app.sequencing.window import Order, order_cost, reinsert, reinsert_by_values
 
 IMPROVES = 1e-9  # relative gain below which a move counts as no improvement
 
@@ -33,9 +33,11 @@ class Effort:
     reach: int = 24  # positions they are taken from
     patience: int = 60  # moves without gain before a block is moved
     kept: int = 3  # descents that are searched further
+    sweeps: bool = True  # start from plain patterns as well
 
 
 NORMAL = Effort()
+SLOW = Effort(moves=60, beams=(10,), stretch=6, taken=4, reach=16, sweeps=False)  # for features that are not compiled
 
 
 class Search:
@@ -43,19 +45,25 @@ class Search:
 
     def __init__(self, problem: SequencingProblem, w: Array, resolved: Resolved, seed: int) -> None:
         self.n, self.rng = problem.n, np.random.default_rng(seed)
-        self.model: Model = model_of(problem, w)
+        self.problem, self.w = problem, w
+        self.model: Model | None = model_of(problem, w) if is_compiled(problem.features) else None
         self.before, self.never_next = resolved.before, resolved.never_next
         self.done, self.free = np.zeros(problem.n, np.bool_), np.array(resolved.free, np.int64)
         self.done[list(resolved.done)] = True
         self.last_done = resolved.done[-1] if resolved.done else -1
-        self.penalty = 1.0 + 10 * float(np.abs(self.model.w).sum() + np.abs(self.model.v).sum()) * problem.n
+        self.penalty = 1.0 + 10 * float(np.abs(w).sum()) * problem.n
         centre = (problem.graph.low + problem.graph.high) / 2
         self.near = np.argsort(((centre[:, None] - centre) ** 2).sum(axis=-1), axis=1, kind="stable")
         self.centre, self.height = centre, problem.graph.height
 
     def cost(self, order: Order) -> float:
         """The order's cost, plus a penalty for every forbidden neighbour."""
-        return float(order_cost(self.model, order, self.done)) + self.penalty * self.broken(order)
+        if self.model is not None:
+            return float(order_cost(self.model, order, self.done)) + self.penalty * self.broken(order)
+        before = np.repeat(self.done[None, :], len(order), axis=0)
+        before[:, order] = np.tri(len(order), k=-1, dtype=np.bool_)
+        paid = (self.problem.values(before) @ self.w)[np.arange(len(order)), order]
+        return float(paid.sum()) + self.penalty * self.broken(order)
 
     def broken(self, order: Order) -> int:
         """Pairs that must not follow each other but do."""
@@ -64,6 +72,8 @@ class Search:
 
     def reinsert(self, order: Order, start: int, stop: int, taken: Order) -> Order:
         """The best order that moves only the regions at the positions `taken`."""
+        if self.model is None:
+            return reinsert_by_values(self.problem, self.w, order, self.done, self.before, start, stop, taken)
         out = np.empty_like(order)
         reinsert(self.model, order, self.done, self.before, start, stop, taken, out)
         return out
@@ -150,7 +160,7 @@ def best_found(
     w: Array,
     resolved: Resolved | None = None,
     seed: int = 0,
-    effort: Effort = NORMAL,
+    effort: Effort | None = None,
     should_stop: Callable[[], bool] = lambda: False,
     report: Report = lambda _share, _cost: None,
 ) -> tuple[int, ...]:
@@ -161,12 +171,13 @@ def best_found(
         w: Weights, shape (n + m,).
         resolved: Constraints.
         seed: Other seeds may find other orders; the same seed always finds the same.
-        effort: How long to search.
+        effort: How long to search; by default as suits the features.
         should_stop: Asked after every move; the best order so far is returned when it says so.
         report: Told after every gain and at the end.
     """
     r = resolved or resolve(None, problem.n)
     search = Search(problem, problem.check_weights(w), r, seed)
+    effort = effort or (NORMAL if search.model is not None else SLOW)
     if not len(search.free):
         return r.done
     found: list[tuple[float, tuple[int, ...]]] = []
@@ -188,7 +199,8 @@ def best_found(
 def _starts(search: Search, problem: SequencingProblem, w: Array, r: Resolved, effort: Effort) -> Iterator[Order]:
     for width in effort.beams:
         yield np.array(beam(problem, w, width, r), np.int64)
-    yield from search.sweeps()
+    if effort.sweeps:
+        yield from search.sweeps()
 
 
 def _wander(

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.geometry.tool import Array
-from app.sequencing.features import Interaction
+from app.sequencing.features import FEATURE_SETS, FeatureSet, base_name
 from app.sequencing.problem import SequencingProblem
 
 KINDS = ("clean", "authors-real", "authors-synthetic")
@@ -42,11 +42,18 @@ class Model(NamedTuple):
     high: Array  # (N, 2)
 
 
+def is_compiled(features: FeatureSet) -> bool:
+    """Whether the compiled cost knows every column of the set."""
+    return base_name(features.name) in KINDS and not features.plugins
+
+
 def model_of(problem: SequencingProblem, w: Array) -> Model:
-    """The compiled form of w . phi for a problem whose feature set is one of KINDS."""
-    g, kind = problem.graph, KINDS.index(problem.features.name)
-    w = problem.check_weights(w)
-    count = len(problem.features.columns)
+    """The compiled form of w . phi for a problem whose feature set `is_compiled`; columns switched off weigh nothing."""
+    g, kind = problem.graph, KINDS.index(base_name(problem.features.name))
+    w, columns = problem.check_weights(w), FEATURE_SETS[KINDS[kind]].columns
+    place = [columns.index(c) for c in problem.features.columns]
+    weights = np.zeros(len(columns))
+    weights[place] = w[: len(place)]
     share = g.shared / np.maximum(g.shared.sum(axis=1, keepdims=True), 1e-30)
     pull = share * g.angle / (2 * np.pi)
     turn = (2 * pull, 2 * g.angle, g.angle)[kind]
@@ -56,9 +63,9 @@ def model_of(problem: SequencingProblem, w: Array) -> Model:
     return Model(
         kind=kind,
         n=problem.n,
-        w=w[:count].copy(),
-        v=w[count:].copy(),
-        factors=_factors(problem, problem.interactions),
+        w=weights,
+        v=w[len(place) :].copy(),
+        factors=_factors(problem, place, len(columns)),
         shared=_plain(g.shared),
         opposite=_plain(g.opposite),
         turn=_plain(turn),
@@ -80,12 +87,12 @@ def _plain(values: Array) -> Array:
     return np.array(values, np.float64, order="C")
 
 
-def _factors(problem: SequencingProblem, interactions: tuple[Interaction, ...]) -> NDArray[np.int64]:
-    factors = np.full((len(interactions), 2, 2), len(problem.features.columns))
-    for i, interaction in enumerate(interactions):
+def _factors(problem: SequencingProblem, place: list[int], none: int) -> NDArray[np.int64]:
+    factors = np.full((len(problem.interactions), 2, 2), none)
+    for i, interaction in enumerate(problem.interactions):
         for j, key in enumerate((interaction.first, interaction.second)):
             columns = problem.features.factors[key]
-            factors[i, j, : len(columns)] = columns
+            factors[i, j, : len(columns)] = [place[c] for c in columns]
     return factors
 
 

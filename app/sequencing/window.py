@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.geometry.tool import Array
+from app.sequencing.problem import SequencingProblem, all_sets
 from app.sequencing.transitions import Model, gap_of, grow_box, no_box, transition_cost
 
 Order = NDArray[np.int64]
@@ -202,3 +203,50 @@ def reinsert(
             s ^= 1 << i
             out[p] = items[i]
     return True
+
+
+def reinsert_by_values(
+    problem: SequencingProblem,
+    w: Array,
+    order: Order,
+    done: NDArray[np.bool_],
+    before: NDArray[np.bool_],
+    start: int,
+    stop: int,
+    taken: Order,
+) -> Order:
+    """The same as `reinsert` for features that are not compiled: all sets at once through their values."""
+    items = order[taken]
+    rest = np.array([a for a in order[start:stop] if a not in items], np.int64)
+    subsets, prefix = all_sets(len(items)), done.copy()
+    prefix[order[:start]] = True
+    sets = np.repeat(np.repeat(prefix[None, None], len(subsets), axis=1), len(rest) + 1, axis=0)
+    sets[:, :, items] = subsets
+    sets[:, :, rest] = np.tri(len(rest) + 1, len(rest), k=-1, dtype=np.bool_)[:, None]
+    flat = sets.reshape(-1, problem.n)
+    waiting = np.zeros(problem.n, np.bool_)
+    waiting[order[start:stop]] = True
+    blocked = (~flat & waiting).astype(np.float64) @ before > 0
+    cost = np.where(blocked | flat, np.inf, problem.values(flat) @ w).reshape(sets.shape)
+    return np.concatenate([order[:start], _put_back(cost, items, rest), order[stop:]])
+
+
+def _put_back(cost: Array, items: Order, rest: Order) -> Order:
+    """The cheapest way through (rest finished, items finished), by the cost (R + 1, 2^k, N) of every next region."""
+    count, k = len(rest), len(items)
+    value, came = np.full(cost.shape[:2], np.inf), np.full(cost.shape[:2], -1)
+    value[0, 0] = 0.0
+    for j in range(count + 1):
+        for s in range(1 << k):
+            for i in (i for i in range(k) if not s >> i & 1):
+                x = value[j, s] + cost[j, s, items[i]]
+                if x < value[j, s | 1 << i]:
+                    value[j, s | 1 << i], came[j, s | 1 << i] = x, i
+            if j < count and value[j, s] + cost[j, s, rest[j]] < value[j + 1, s]:
+                value[j + 1, s], came[j + 1, s] = value[j, s] + cost[j, s, rest[j]], k
+    j, s, out = count, (1 << k) - 1, []
+    while j or s:
+        i = came[j, s]
+        out.append(rest[j - 1] if i == k else items[i])
+        j, s = (j - 1, s) if i == k else (j, s ^ 1 << i)
+    return np.array(out[::-1], np.int64)

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 from app.geometry.tool import GraphSource
 from app.sequencing.beam import beam
 from app.sequencing.constraints import Constraints, check_order, resolve
-from app.sequencing.features import Interaction
+from app.sequencing.features import FEATURE_SETS, Interaction
 from app.sequencing.large import Effort, Search, best_found
 from app.sequencing.problem import SequencingProblem, problem_for
 from app.sequencing.shortest import shortest_sequence
 from app.sequencing.transitions import model_of
-from app.sequencing.window import order_cost, reinsert
+from app.sequencing.window import order_cost, reinsert, reinsert_by_values
 from tests.sequencing.graphs import grid_graph
 
 SHORT = Effort(moves=60, beams=(1,))
@@ -121,3 +121,24 @@ def test_goes_on_after_what_is_done():
     assert order[:3] == done
     every = [done + rest for rest in itertools.permutations(sorted(set(range(8)) - set(done)))]
     assert problem.cost(w, order) == pytest.approx(min(problem.cost(w, s) for s in every))
+
+
+def test_features_that_are_not_compiled_are_searched_through_their_values():
+    graph = grid_graph(2, 5, 3)
+    problem = SequencingProblem(graph, FEATURE_SETS["layout"], ())
+    w = np.random.default_rng(4).normal(size=len(problem.columns))
+    assert problem.cost(w, best_found(problem, w)) == pytest.approx(shortest_sequence(problem, w).cost)
+
+
+@given(st.integers(0, 10_000))
+@settings(max_examples=20, deadline=None)
+def test_both_ways_of_reinsertion_agree(seed: int):
+    rng = np.random.default_rng(seed)
+    problem = problem_for(grid_graph(3, 4, seed))
+    w, order = rng.normal(size=13), rng.permutation(12)
+    before = np.zeros((12, 12), np.bool_)
+    before[order[2], order[7]] = before[order[4], order[9]] = True
+    taken, done, out = np.sort(rng.choice(np.arange(2, 11), 4, replace=False)), np.zeros(12, np.bool_), np.empty(12, np.int64)
+    assert reinsert(model_of(problem, w), order, done, before, 2, 11, taken, out)
+    slow = reinsert_by_values(problem, w, order, done, before, 2, 11, taken)
+    assert problem.cost(w, slow) == pytest.approx(problem.cost(w, out))
