@@ -20,6 +20,7 @@ from app.api import (
     events,
     playbacks,
     policies,
+    process,
     projects,
     queries,
     reference,
@@ -39,7 +40,7 @@ from app.workflow.projects import get_project
 VERSION = "0.1.0"
 STATIC = ROOT / "static"
 HOSTS = ("127.0.0.1", "localhost", "::1")
-NOUNS = (projects, tools, segmentations, drafts, demonstrations, coverage, runs, queries, policies, playbacks, sessions, events)
+NOUNS = (projects, tools, segmentations, drafts, demonstrations, coverage, process, runs, queries, policies, playbacks, sessions, events)
 DESCRIPTION = "Learns in which order an expert works on the regions of a part, and shows a robot doing it on another part."
 PROBLEMS: dict[int | str, dict[str, Any]] = {
     "4XX": {"model": errors.Problem, "description": "Refused; the body says why and what is accepted."},
@@ -52,6 +53,7 @@ class PageName(Enum):
 
     tools = "tools"
     record = "record"
+    process = "process"
     coverage = "coverage"
     teach = "teach"
     policy = "policy"

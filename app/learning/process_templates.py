@@ -37,8 +37,8 @@ BUILT_IN = (
     ProcessTemplate(
         "finishing",
         "Surface finishing",
-        "Sanding and polishing leave no material that later regions lean on: jumps cost time and turns change the grip, borders need an even "
-        "blend. Height has no say of its own, and an edge that faces another one is left out.",
+        "Sanding and polishing leave no material that later regions lean on: jumps cost time and turns change the grip, "
+        "borders need an even blend. Height has no say of its own, and an edge that faces another one is left out.",
         ("height", "opposite_unfinished", "opposite_finished"),
         (Interaction("orientation", "curvature"), Interaction("jump", "curvature")),
         "quantile",

@@ -74,7 +74,8 @@ def _faults_on(values: Plugin, graph: RegionGraph, bounds: tuple[float, float] |
     if bounds is not None and (own[open_].min() < bounds[0] - EVEN or own[open_].max() > bounds[1] + EVEN):
         m, a = _where(open_ & ((own < bounds[0] - EVEN) | (own > bounds[1] + EVEN)))
         faults.append(
-            f"values must lie between {bounds[0]:g} and {bounds[1]:g}, and region {a} has {own[m, a]:g} after {int(done[m].sum())} finished ones."
+            f"values must lie between {bounds[0]:g} and {bounds[1]:g}, "
+            f"and region {a} has {own[m, a]:g} after {int(done[m].sum())} finished ones."
         )
     return faults + _unsteady(values, graph, done, own)
 

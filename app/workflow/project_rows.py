@@ -6,11 +6,12 @@ from sqlmodel import Session, col, func, select
 
 from app.errors import InvalidInput
 from app.jobs.rows import running_jobs
-from app.sequencing.features import DEFAULT_INTERACTIONS, FACTOR_WORDS, FEATURE_SETS, FeatureSet, Interaction, interaction_label
+from app.sequencing.features import DEFAULT_INTERACTIONS, FACTOR_WORDS, FeatureSet, Interaction, interaction_label
 from app.storage import emit
 from app.storage.identity import now
-from app.storage.tables import Demonstration, Project, Segmentation, ToolRow
-from app.workflow.lookup import open_query_count, standing, tools_of
+from app.storage.tables import Demonstration, Project, ToolRow
+from app.workflow.feature_choice import project_features
+from app.workflow.lookup import open_query_count, tools_of
 from app.workflow.reports import rho
 from app.workflow.stages import Progress, next_step, stages
 from app.workflow.values import Values
@@ -51,25 +52,17 @@ def stored(interactions: tuple[Interaction, ...]) -> list[dict[str, str]]:
     return [{"first": i.first, "second": i.second} for i in interactions]
 
 
-def project_features(session: Session, project_id: str) -> FeatureSet:
-    """The feature set of the demonstrated tools, else of the oldest tool, else the one for meshes."""
-    demonstrated = standing(session, project_id)
-    wanted = select(Segmentation).join(ToolRow, col(ToolRow.id) == col(Segmentation.tool_id)).where(col(Segmentation.current))
-    wanted = wanted.where(ToolRow.project_id == project_id, col(ToolRow.deleted_at).is_(None)).order_by(col(ToolRow.id))
-    row = session.get(Segmentation, demonstrated[0].segmentation_id) if demonstrated else session.exec(wanted.limit(1)).first()
-    return FEATURE_SETS[row.feature_set if row else "clean"]
-
-
 def labelled(interactions: list[dict[str, str]], features: FeatureSet) -> list[Json]:
     """Interactions with words."""
     return [{**i, "label": interaction_label(Interaction(i["first"], i["second"]), features)} for i in interactions]
 
 
 def interaction_choices(features: FeatureSet) -> list[Json]:
-    """All pairs of factors that have plain names."""
-    keys = [key for key in FACTOR_WORDS if key in features.factors]
+    """All pairs of factors that have plain names, own features among them."""
+    own = [features.columns[i].key for i in range(len(features.columns) - len(features.plugins), len(features.columns))]
+    keys = [key for key in FACTOR_WORDS if key in features.factors] + own
     pairs = [{"first": a, "second": b} for k, a in enumerate(keys) for b in keys[k + 1 :]]
-    usual = stored(DEFAULT_INTERACTIONS)
+    usual = [p for p in stored(DEFAULT_INTERACTIONS) if {p["first"], p["second"]} <= features.factors.keys()]
     return labelled(usual + [p for p in pairs if p not in usual and {"first": p["second"], "second": p["first"]} not in usual], features)
 
 
@@ -88,6 +81,7 @@ def project_json(values: Values, session: Session, row: Project) -> Json:
         "id": row.id,
         "name": row.name,
         "process": row.process,
+        "template": row.template,
         "sample": row.sample,
         "interactions": labelled(row.interactions, features),
         "interaction_choices": interaction_choices(features),

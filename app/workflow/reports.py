@@ -4,6 +4,7 @@ from sqlmodel import Session
 
 from app.learning.coverage import CoverageReport, coverage
 from app.storage.tables import Project, ToolRow
+from app.workflow.feature_choice import project_features
 from app.workflow.lookup import current_segmentation, standing, tools_of
 from app.workflow.values import Values, interactions_from
 
@@ -27,11 +28,12 @@ def report_of(values: Values, session: Session, project: Project, extra: tuple[P
         return [], None
     tools = [t for t in known if cuts[t.id].feature_set == cuts[first.id].feature_set]
     interactions = interactions_from(project.interactions)
+    counted = project_features(session, project.id, cuts[first.id].feature_set)
     shown = tuple((i, picks[t.id]) for i, t in enumerate(tools) if t.id in picks)
-    key = (tuple(cuts[t.id].id for t in tools), shown, interactions)
+    key = (tuple(cuts[t.id].id for t in tools), shown, interactions, counted.name)
 
     def make() -> CoverageReport:
-        problems = [values.problem(session, cuts[t.id], interactions) for t in tools]
+        problems = [values.problem(session, cuts[t.id], interactions, counted) for t in tools]
         return coverage(problems, list(shown), interactions)
 
     return tools, values.reports.get(key, make)

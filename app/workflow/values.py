@@ -13,7 +13,7 @@ from app.geometry.importing import ImportedPart
 from app.geometry.merge_tree import MergeTree
 from app.geometry.pieces import tree_for
 from app.geometry.tool import Tool
-from app.sequencing.features import FEATURE_SETS, Interaction
+from app.sequencing.features import FEATURE_SETS, FeatureSet, Interaction
 from app.sequencing.problem import SequencingProblem
 from app.storage import Store
 from app.storage.conversions import part_from_bytes, tool_from_bytes
@@ -88,11 +88,14 @@ class Values:
         tools = self.tool(session, old), self.tool(session, new)
         return self._maps.get((old.tool_sha, new.tool_sha), lambda: map_regions(*tools))
 
-    def problem(self, session: Session, segmentation: Segmentation, interactions: tuple[Interaction, ...]) -> SequencingProblem:
-        """The tool's sequencing problem with its tables, once built."""
+    def problem(
+        self, session: Session, segmentation: Segmentation, interactions: tuple[Interaction, ...], features: FeatureSet | None = None
+    ) -> SequencingProblem:
+        """The tool's sequencing problem with its tables, once built; under all features of the tool's own set if none are given."""
         graph = self.tool(session, segmentation).graph
-        features = FEATURE_SETS[segmentation.feature_set]
-        return self._problems.get((segmentation.id, interactions), lambda: SequencingProblem(graph, features, interactions))
+        counted = features or FEATURE_SETS[segmentation.feature_set]
+        key = (segmentation.id, counted.name, interactions)
+        return self._problems.get(key, lambda: SequencingProblem(graph, counted, interactions))
 
 
 def interactions_from(rows: list[dict[str, str]]) -> tuple[Interaction, ...]:

@@ -21,6 +21,9 @@ BODIES: dict[str, dict[str, Any]] = {
     "create_demonstration": {"sequence": [0]},
     "update_demonstration": {"name": "x"},
     "set_interactions": {"interactions": []},
+    "set_process": {"without": []},
+    "save_template": {"project_id": UNKNOWN, "name": "x"},
+    "change_template": {"name": "x"},
     "start_run": {"kind": "performance"},
     "answer_query": {"value": "similar"},
     "make_plan": {"tool_id": UNKNOWN},
@@ -32,7 +35,7 @@ BODIES: dict[str, dict[str, Any]] = {
     "control_playback": {"action": "pause"},
 }
 UPLOADS = {"upload_tool": ("x.stl", tetrahedron()), "import_region_table": ("x.csv", REAL_TABLE.encode())}
-WITHOUT_IDS = {"region_table_template", "list_projects", "create_project", "create_sample_project", "healthz", "readyz"}
+WITHOUT_IDS = {"region_table_template", "list_projects", "create_project", "create_sample_project", "list_templates", "healthz", "readyz"}
 
 
 def operations(client: TestClient) -> list[tuple[str, str, dict[str, Any]]]:
@@ -96,7 +99,7 @@ def test_unknown_fields_are_422_on_every_route(client: TestClient) -> None:
 
 
 def test_changes_of_versioned_things_need_a_version(client: TestClient) -> None:
-    """428 without If-Match; the six changes of the three versioned nouns."""
+    """428 without If-Match; the seven changes of the three versioned nouns."""
     seen = []
     for method, path, operation in operations(client):
         if any(p["name"] == "If-Match" for p in operation.get("parameters", [])):
@@ -106,7 +109,7 @@ def test_changes_of_versioned_things_need_a_version(client: TestClient) -> None:
             assert "If-Match" in detail
             seen.append(operation["operationId"])
     assert sorted(seen) == [
-        "answer_tool", "delete_demonstration", "delete_project", "delete_tool", "update_demonstration", "update_project",
+        "answer_tool", "delete_demonstration", "delete_project", "delete_tool", "set_process", "update_demonstration", "update_project",
     ]  # fmt: skip
 
 

@@ -16,7 +16,8 @@ from tests.sequencing.graphs import every_order, grid_graph
 CLEAN = FEATURE_SETS["clean"]
 SMALL = OwnFeature(
     "import numpy as np\nKEY, LABEL = 'small_first', 'Small regions first'\n\n\n"
-    "def values(graph, done):\n    return np.broadcast_to(1 - graph.area / graph.area.max(), done.shape) * (1 - done.mean(axis=1, keepdims=True))\n"
+    "def values(graph, done):\n    "
+    "return np.broadcast_to(1 - graph.area / graph.area.max(), done.shape) * (1 - done.mean(axis=1, keepdims=True))\n"
 )
 
 

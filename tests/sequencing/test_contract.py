@@ -92,6 +92,6 @@ def test_an_own_feature_is_its_text(tmp_path: Path) -> None:
 def test_a_malformed_file_is_refused_with_a_sentence(tmp_path: Path, text: str, sentence: str) -> None:
     path = tmp_path / "own.py"
     path.write_text(text, encoding="utf-8")
-    with pytest.raises(InvalidFeature, match="own.py") as caught:
+    with pytest.raises(InvalidFeature, match=r"own\.py") as caught:
         read_own_feature(path)
     assert sentence in str(caught.value)

@@ -1,0 +1,92 @@
+"""Which features count in a project: templates, switches, own features, and what they do to coverage and questions."""
+
+from typing import Any
+
+import pytest
+
+from app.errors import InvalidFeature, InvalidInput, UnknownFeature
+from app.workflow import coverage, process, projects
+from app.workflow.context import Context
+
+OWN = """KEY, LABEL = "small_first", "Small regions first"
+
+
+def values(graph, done):
+    return (1 - graph.area / graph.area.max()) + 0 * done
+"""
+
+
+@pytest.fixture
+def project(ctx: Context) -> dict[str, Any]:
+    return projects.create_sample_project(ctx)
+
+
+def put(ctx: Context, name: str, text: str) -> None:
+    folder = ctx.settings.data / "features"
+    folder.mkdir(exist_ok=True)
+    (folder / name).write_text(text, encoding="utf-8")
+
+
+def test_a_template_switches_features_and_interactions(ctx: Context, project: dict[str, Any]) -> None:
+    before = coverage.get_coverage(ctx, project["id"])
+    seen = process.set_process(ctx, project["id"], {"template": "spraying"})
+    off = {f["key"] for f in seen["features"] if not f["on"]}
+    assert (seen["template"], off, seen["levels"]) == ("spraying", {"orientation"}, "range")
+    assert seen["feature_set"] == "clean~orientation"
+    assert [i["first"] + " " + i["second"] for i in seen["interactions"]] == ["height curvature", "height jump"]
+    after = coverage.get_coverage(ctx, project["id"])
+    assert [t["label"] for t in after["tables"]] != [t["label"] for t in before["tables"]]
+    assert projects.get_project(ctx, project["id"])["process"] == "Spraying"
+
+
+def test_switching_a_feature_off_takes_its_interactions_away(ctx: Context, project: dict[str, Any]) -> None:
+    seen = process.set_process(ctx, project["id"], {"without": ["curvature"]})
+    assert seen["interactions"] == []
+    with pytest.raises(UnknownFeature, match="no_such"):
+        process.set_process(ctx, project["id"], {"without": ["no_such"]})
+    with pytest.raises(InvalidInput, match="At least one"):
+        process.set_process(ctx, project["id"], {"without": [f["key"] for f in seen["features"]]})
+    assert process.get_process(ctx, project["id"])["feature_set"] == "clean~curvature"
+
+
+def test_an_own_feature_shows_up_and_can_be_suspected(ctx: Context, project: dict[str, Any]) -> None:
+    put(ctx, "small_first.py", OWN)
+    listed = process.get_process(ctx, project["id"])["own"]
+    assert [(o["file"], o["key"], o["on"], o["faults"]) for o in listed] == [("small_first.py", "small_first", False, [])]
+    seen = process.set_process(ctx, project["id"], {"own": ["small_first"]})
+    assert seen["own"][0]["on"]
+    coverage.set_interactions(ctx, project["id"], [{"first": "small_first", "second": "curvature"}])
+    assert "small regions first" in coverage.get_coverage(ctx, project["id"])["tables"][0]["label"].lower()
+
+
+def test_a_changed_file_leaves_the_feature_in_use_as_it_was(ctx: Context, project: dict[str, Any]) -> None:
+    put(ctx, "small_first.py", OWN)
+    first = process.set_process(ctx, project["id"], {"own": ["small_first"]})["own"][0]["version"]
+    put(ctx, "small_first.py", OWN.replace("1 - ", ""))
+    listed = process.get_process(ctx, project["id"])["own"]
+    assert [(o["file"], o["on"], o["version"] == first) for o in listed] == [("small_first.py", False, False), (None, True, True)]
+
+
+def test_a_feature_that_breaks_the_contract_is_refused_in_words(ctx: Context, project: dict[str, Any]) -> None:
+    put(ctx, "wide.py", OWN.replace("(1 - graph", "(3 - graph"))
+    put(ctx, "broken.py", "KEY = 1")
+    listed = {o["file"]: o["faults"] for o in process.get_process(ctx, project["id"])["own"]}
+    assert "between 0 and 1" in listed["wide.py"][0]
+    assert "needs KEY" in listed["broken.py"][0]
+    with pytest.raises(InvalidFeature, match="between 0 and 1"):
+        process.set_process(ctx, project["id"], {"own": ["small_first"]})
+    with pytest.raises(UnknownFeature, match="defines a feature 'other'"):
+        process.set_process(ctx, project["id"], {"own": ["other"]})
+
+
+def test_a_choice_is_saved_renamed_taken_over_and_put_away(ctx: Context, project: dict[str, Any]) -> None:
+    process.set_process(ctx, project["id"], {"without": ["jump"]})
+    saved = process.save_template(ctx, project["id"], "Our sanding", "Jumps cost nothing here.")
+    process.change_template(ctx, saved["id"], {"name": "Sanding, hall 2"})
+    other = projects.create_project(ctx, "Another")
+    assert process.set_process(ctx, other["id"], {"template": saved["id"]})["feature_set"] == "clean~jump"
+    assert [t["name"] for t in process.list_templates(ctx)][-1] == "Sanding, hall 2"
+    process.delete_template(ctx, saved["id"])
+    assert all(t["built_in"] for t in process.list_templates(ctx))
+    with pytest.raises(InvalidInput, match="Built-in"):
+        process.change_template(ctx, "layup", {"name": "Mine"})
