@@ -34,8 +34,7 @@ def measure(mesh: Mesh, labels: NDArray[np.int32]) -> Tool:
     inside = labels >= 0
     compact = np.full(len(labels), -1, np.int32)
     compact[inside] = np.unique(labels[inside], return_inverse=True)[1].ravel()
-    first = find_attributes(mesh, compact)
-    rank = np.argsort(reading_order(first.low[:, :2], first.high[:, :2]))
+    rank = np.argsort(reading_order(*_plan_boxes(mesh, compact)))
     return measure_labelled(mesh, np.where(inside, rank[compact], -1).astype(np.int32))
 
 
@@ -44,6 +43,16 @@ def measure_labelled(mesh: Mesh, labels: NDArray[np.int32], names: Sequence[str]
     attributes = find_attributes(mesh, labels)
     graph = _graph(mesh, labels, attributes)
     return Tool(mesh, labels, _regions(attributes, names), graph)
+
+
+def _plan_boxes(mesh: Mesh, labels: NDArray[np.int32]) -> tuple[Array, Array]:
+    """Lower and upper corner (n, 2) of every region's box in plan view."""
+    n, inside = int(labels.max()) + 1, labels >= 0
+    corners = mesh.vertices[mesh.faces[inside], :2]
+    low, high = np.full((n, 2), np.inf), np.full((n, 2), -np.inf)
+    np.minimum.at(low, labels[inside], corners.min(axis=1))
+    np.maximum.at(high, labels[inside], corners.max(axis=1))
+    return low, high
 
 
 def reading_order(low: Array, high: Array) -> NDArray[np.int64]:
