@@ -15,7 +15,7 @@ from app.learning.baselines.likelihood import by_bayes, by_maximum_entropy
 from app.learning.baselines.margin_planning import plan_by_margin
 from app.learning.certified import certify
 from app.learning.expert import ScriptedExpert
-from app.learning.generalising import learn_generalising, on_features
+from app.learning.generalising import learn_generalising, learn_unasked, on_features
 from app.learning.hits import judge
 from app.learning.performance import performance_step, start_performance
 from app.learning.performance_state import LearningDemonstration, PerformanceParameters
@@ -78,8 +78,9 @@ class Line:
 def learners(expert: ScriptedExpert, seed: int) -> dict[str, Learner]:
     """Name -> learner; the expert answers where a learner asks."""
     return {
-        "ours, generalising": generalise,
-        "ours, certified": lambda demos, _: _certified(demos, seed),
+        "ours": lambda demos, _: _ours(demos, seed),
+        "ours, always likelihood": lambda demos, _: _with_policy(learn_generalising(demos).policy),
+        "ours, always certified": lambda demos, _: _certified(demos, seed),
         "Algorithm 1 (paper)": lambda demos, _: _paper(demos, expert, seed),
         "max-margin planning": plan_by_margin,
         "maximum entropy": by_maximum_entropy,
@@ -89,12 +90,12 @@ def learners(expert: ScriptedExpert, seed: int) -> dict[str, Learner]:
     }
 
 
-def generalise(demonstrations: list[LearningDemonstration], generator: np.random.Generator) -> Learned:
-    """`learn_generalising` in the shape of the harness; the generator is not used."""
-    del generator
-    policy = learn_generalising(demonstrations).policy
-    features = FEATURE_SETS[policy.features]
-    return Learned(lambda problem: predict(on_features(problem, features), policy).sequence, policy)
+def _ours(demonstrations: list[LearningDemonstration], seed: int) -> Learned:
+    return _with_policy(learn_unasked(demonstrations, seed).policy)
+
+
+def _with_policy(policy: Policy) -> Learned:
+    return Learned(lambda problem: predict(_under(problem, policy), policy).sequence, policy)
 
 
 def _certified(demonstrations: list[LearningDemonstration], seed: int) -> Learned:
@@ -205,7 +206,7 @@ def format_comparison(lines: list[Line]) -> str:
     for kind in dict.fromkeys(line.kind for line in lines):
         rows = [line for line in lines if line.kind == kind]
         title = titles.get(kind, f"{rows[0].cases} made-up experts of random weights, synthetic tools and split")
-        text += ["", title, "learner                 train   test    hits     regret    tau   answers    cpu s"]
+        text += ["", title, "learner                  train   test    hits     regret    tau   answers    cpu s"]
         text += [_row(line) for line in rows]
     return "\n".join(text[1:])
 
@@ -214,6 +215,6 @@ def _row(line: Line) -> str:
     regret = "       -" if line.regret is None else f"{line.regret:8.2%}"
     hits = f"{line.test_hits}/{line.test}"
     return (
-        f"{line.learner:22s}  {line.train_success:5.0%}  {line.test_success:5.0%}  {hits:>7s}   {regret}  {line.tau:5.2f}"
+        f"{line.learner:23s}  {line.train_success:5.0%}  {line.test_success:5.0%}  {hits:>7s}   {regret}  {line.tau:5.2f}"
         f"  {line.answers:8.1f}  {line.cpu_s:7.2f}"
     )

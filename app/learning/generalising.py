@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from app.errors import InvalidInput
+from app.learning.certified import Certificate, certify
 from app.learning.hits import judge
 from app.learning.maximum_entropy import Lesson, SoftFit, fit, left_out_weights, lessons_of, surprise
 from app.learning.performance_state import LearningDemonstration
@@ -88,6 +89,36 @@ def learn_generalising(
     features = FEATURE_SETS[best.features]
     policy = Policy(found.weights / scale * np.array(live), features.name, features.version, (), None, live)
     return Generalised(policy, tuple(t for t, *_ in tried), scale, found)
+
+
+@dataclass(frozen=True)
+class Unasked:
+    """The product's choice without answers."""
+
+    policy: Policy
+    certificate: Certificate | None  # the demonstrations agree under one set of weights, proved; None: they do not
+    generalised: Generalised | None  # then likelihood decides
+
+
+def learn_unasked(demonstrations: list[LearningDemonstration], seed: int = 0) -> Unasked:
+    """Certified weights where the demonstrations agree exactly, else the policy that best predicts those left out.
+
+    An expert who follows the weights to the letter is predicted best by the weights that all demonstrations agree on; one who makes
+    exceptions, by likelihood. Which kind it is, the demonstrations say themselves.
+
+    Raises:
+        EmptySample: No demonstration, or all orders have the same features.
+        InvalidInput: The tools differ in their features, or one has too many regions for likelihood.
+    """
+    certificate = certify(demonstrations, seed=seed)
+    if certificate.realisable:
+        first = demonstrations[0].problem
+        policy = Policy(
+            certificate.weights, first.features.name, first.features.version, first.interactions, None, certificate.identifiable
+        )
+        return Unasked(policy, certificate, None)
+    found = learn_generalising(demonstrations)
+    return Unasked(found.policy, None, found)
 
 
 def _tried(shown: list[LearningDemonstration], lessons: list[Lesson], found: SoftFit, unit: Array) -> Trial:

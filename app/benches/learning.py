@@ -1,0 +1,131 @@
+"""`apprentice bench learning`: hits, answers and time of the learners, beside the bars."""
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from app.benches.figures import Figure, Options
+from app.benches.studies import demonstrations
+from app.benches.teaching import SYNTHETIC_TRUTH, Taught, made_up_truths, teach
+from app.errors import InvalidInput
+from app.learning.certified import certify
+from app.learning.certified_state import CertifiedParameters
+from app.learning.evaluation import TRAINED_ON
+from app.learning.expert import ScriptedExpert
+from app.learning.generalising import LAYOUT, PENALTIES, learn_generalising, on_features
+from app.learning.hits import Outcome, judge
+from app.learning.maximum_entropy import lessons_of, surprise
+from app.learning.performance import performance_step, start_performance
+from app.learning.performance_state import LearningDemonstration, PerformanceParameters
+from app.learning.qp import Array
+from app.sequencing.features import FEATURE_SETS
+from app.sequencing.shortest import shortest_sequence
+
+SEEDS, QUICK_SEEDS = 30, 3
+REPEATS = 20
+Shown = dict[int, LearningDemonstration]
+
+
+def measure(options: Options) -> Iterator[Figure]:
+    """All figures; they need the authors' tables."""
+    if options.data is None:
+        raise InvalidInput("The learning bench needs the authors' tables: give their folder with --data.")
+    synthetic = demonstrations("synthetic", options.data)
+    seeds = QUICK_SEEDS if options.quick else SEEDS
+    yield from _synthetic(synthetic)
+    yield from _made_up(synthetic, seeds)
+    yield from _real(options.data, options.quick)
+    yield from _speed(synthetic)
+
+
+def _synthetic(shown: Shown) -> Iterator[Figure]:
+    group = "authors' synthetic tools, split 6 / 4"
+    trained, unseen = [[d for i, d in shown.items() if (i in TRAINED_ON["synthetic"]) is part] for part in (True, False)]
+    truth = np.array(SYNTHETIC_TRUTH)
+    tools = [d.problem for d in unseen]
+    runs = [teach(trained, tools, truth, parameters=CertifiedParameters()) for _ in range(5)]
+    weights = runs[0].weights
+    yield Figure(group, "training tools hit", _hits(trained, weights), "of 6", 6, "at least", _sizes(trained, weights))
+    yield Figure(group, "test tools hit", _hits(unseen, weights), "of 4", 4, "at least", _sizes(unseen, weights))
+    yield Figure(group, "answers, with a stop of its own", runs[0].answers, "", 2, "at most")
+    yield Figure(group, "cpu, warm", min(r.cpu_s for r in runs[1:]) * 1e3, "ms", 150, "at most")
+    alone = certify(trained).weights
+    yield Figure(group, "no answers: training tools hit", _hits(trained, alone), "of 6", 6, "at least", _sizes(trained, alone))
+    yield Figure(group, "no answers: test tools hit", _hits(unseen, alone), "of 4")
+    paper, questions, spent = _paper(trained, truth)
+    yield Figure(group, "paper mode: training tools hit", _hits(trained, paper), "of 6", 6, "at least", _sizes(trained, paper))
+    yield Figure(group, "paper mode: test tools hit", _hits(unseen, paper), "of 4")
+    yield Figure(group, "paper mode: answers", questions)
+    yield Figure(group, "paper mode: cpu", spent * 1e3, "ms")
+    same = all(r.weights.tobytes() == weights.tobytes() for r in runs)
+    yield Figure(group, "same seed and answers give the same bytes", float(same), "", 1, "at least")
+
+
+def _paper(trained: list[LearningDemonstration], truth: Array) -> tuple[Array, int, float]:
+    """Algorithm 1 with the default hyperparameters: weights, answers, cpu seconds."""
+    expert, parameters, started = ScriptedExpert(truth, None), PerformanceParameters(), time.process_time()
+    state, answers = start_performance(trained, parameters, 0), dict[str, str]()
+    while True:
+        result = performance_step(trained, parameters, state, answers, parameters.iterations)
+        state = result.state
+        for q in result.questions:
+            d = trained[q.demonstration]
+            answers[q.fingerprint] = expert.similar(d.problem, d.sequence, q.candidate)
+        if result.outcome not in ("training", "questions"):
+            return result.weights, len(answers), time.process_time() - started
+
+
+def _made_up(shown: Shown, seeds: int) -> Iterator[Figure]:
+    problems = {i: d.problem for i, d in shown.items()}
+    truths = made_up_truths(seeds, len(problems[1].columns))
+    for count, bar in ((6, 2), (1, 10)):
+        group = f"made-up experts ({seeds}), {count} demonstration{'s' if count > 1 else ''}, {10 - count} unseen tools"
+        runs: list[Taught] = []
+        for k, truth in enumerate(truths):
+            known = TRAINED_ON["synthetic"] if count == 6 else (list(problems)[k % len(problems)],)
+            demos = [LearningDemonstration(problems[i], shortest_sequence(problems[i], truth).sequence) for i in known]
+            runs.append(teach(demos, [p for i, p in problems.items() if i not in known], truth, seed=k))
+        spent = [r.answers + r.shown for r in runs]  # a tool whose two orders are both wrong has to be shown, which is work too
+        note = f"mean {np.mean(spent):.1f}, most {max(spent)}; until all samples choose the same order everywhere"
+        yield Figure(group, "answers and tools shown, median", float(np.median(spent)), "", bar, "at most", note)
+        yield Figure(group, "of these tools shown (both orders were wrong), mean", float(np.mean([r.shown for r in runs])))
+        yield Figure(group, "tools wrong at the stop, mean", float(np.mean([r.wrong for r in runs])), "", 0, "at most")
+        yield Figure(group, "cpu per run, mean", float(np.mean([r.cpu_s for r in runs])) * 1e3, "ms")
+
+
+def _real(data: Path, quick: bool) -> Iterator[Figure]:
+    group = "authors' real tools, one left out at a time, no answers"
+    shown = demonstrations("real", data)
+    sets, penalties = ((LAYOUT,), PENALTIES[-1:]) if quick else (None, PENALTIES)
+    outcomes: dict[int, Outcome] = {}
+    for i in list(shown)[: 2 if quick else None]:
+        policy = learn_generalising([d for j, d in shown.items() if j != i], sets, penalties).policy
+        problem = on_features(shown[i].problem, FEATURE_SETS[policy.features])
+        outcomes[i] = judge(problem, policy.weights, shown[i].sequence)
+    missed = ", ".join(str(i) for i, o in outcomes.items() if not o.hit) or "none"
+    note = f"missed: {missed}; class sizes {', '.join(str(o.class_size) for o in outcomes.values())}"
+    yield Figure(group, "hits", sum(o.hit for o in outcomes.values()), f"of {len(outcomes)}", 8, "at least", note)
+    yield Figure(group, "Kendall tau, mean", float(np.mean([o.tau for o in outcomes.values()])), "", 0.92, "at least")
+
+
+def _speed(shown: Shown) -> Iterator[Figure]:
+    largest = max(shown.values(), key=lambda d: d.problem.n)
+    (lesson,), _, _ = lessons_of([largest])
+    w = np.full(len(lesson.total), 0.5)
+    surprise(lesson, w)
+    spent = []
+    for _ in range(REPEATS):
+        started = time.process_time()
+        surprise(lesson, w)
+        spent.append(time.process_time() - started)
+    yield Figure("likelihood", f"value and gradient, {lesson.n} regions", min(spent) * 1e3, "ms", 2, "at most", f"best of {REPEATS}")
+
+
+def _hits(shown: list[LearningDemonstration], weights: Array) -> float:
+    return sum(judge(d.problem, weights, d.sequence).hit for d in shown)
+
+
+def _sizes(shown: list[LearningDemonstration], weights: Array) -> str:
+    return "class sizes " + ", ".join(str(judge(d.problem, weights, d.sequence).class_size) for d in shown)
