@@ -41,6 +41,7 @@ class Policy(Row):
     weights: list[Weight]
     effort_weights: list[Weight] | None
     converged: bool
+    certificate: Json | None  # of a certified run: what is proved, and how sure each tool is
     learned_from: LearnedFrom
     created_at: str
 
@@ -92,6 +93,9 @@ class Plan(Row):
     cost: float
     ties: int
     proved: bool
+    bound: float | None  # no order costs less; null when nothing can be said
+    gap: float | None  # (cost - bound) / |cost|: 0 when proved
+    sureness: str  # "Proved optimal", or "Best found, at most x % above the optimum"
     method: str
     orders: str
     milliseconds: float

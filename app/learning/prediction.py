@@ -1,13 +1,15 @@
 """The order a policy chooses for a tool, with its reasons."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from app.learning.effort_features import effort_penalty
 from app.learning.policy import Policy
 from app.learning.qp import Array
+from app.sequencing.bounds import lower_bound
 from app.sequencing.features import Feature
 from app.sequencing.problem import SequencingProblem
-from app.sequencing.shortest import shortest_sequence
+from app.sequencing.shortest import gap_between, shortest_sequence
 
 
 @dataclass(frozen=True)
@@ -18,15 +20,24 @@ class Prediction:
     cost: float
     ties: int  # sequences of this cost, this one included
     proved: bool  # no sequence is cheaper, for certain
+    bound: float  # no sequence costs less; -inf when nothing can be said
     method: str
     effort: float | None  # eta of the sequence, None when effort was not learned
     step_parts: Array  # (N, n + m) w * phi of each step; adds up to the cost
     labels: tuple[Feature, ...]  # (n + m)
     tie_settled_by: str | None  # plain words, None without ties
 
+    @property
+    def gap(self) -> float:
+        """At most how far the cost lies above the optimum, as a share of |cost|."""
+        return gap_between(self.cost, self.bound)
 
-def predict(problem: SequencingProblem, policy: Policy) -> Prediction:
+
+def predict(problem: SequencingProblem, policy: Policy, should_stop: Callable[[], bool] = lambda: False) -> Prediction:
     """The lowest-cost sequence; among equally cheap ones the one of least effort (Eq. 8), then the lowest region ids.
+
+    Where the sequence can't be proved the cheapest, a lower bound says how far it may be off; `should_stop` ends the search
+    for a better bound, and never changes the sequence.
 
     Raises:
         StalePolicy: The policy belongs to another feature set, version or interactions.
@@ -36,6 +47,7 @@ def predict(problem: SequencingProblem, policy: Policy) -> Prediction:
     breaks = effort is not None and bool((effort != 0).any())
     tie_break = (lambda s: effort_penalty(problem, effort, s)) if effort is not None and breaks else None
     best = shortest_sequence(problem, policy.weights, tie_break)
+    bound = best.cost if best.proved else lower_bound(problem, policy.weights, best.cost, should_stop=should_stop)
     settled = None
     if best.ties > 1:
         settled = "least effort at start and end" if breaks else "region names: no effort was learned"
@@ -44,6 +56,7 @@ def predict(problem: SequencingProblem, policy: Policy) -> Prediction:
         cost=best.cost,
         ties=best.ties,
         proved=best.proved,
+        bound=bound,
         method=best.method,
         effort=None if effort is None else effort_penalty(problem, effort, best.sequence),
         step_parts=problem.step_features(best.sequence) * policy.weights,

@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,8 @@ from app.learning.effort_features import EFFORT_COLUMNS
 from app.learning.policy import Policy
 from app.learning.prediction import Prediction, predict
 from app.sequencing.features import FEATURE_SETS, Feature, interaction_column
-from app.sequencing.problem import check_sequence
+from app.sequencing.problem import SequencingProblem, check_sequence
+from app.sequencing.shortest import gap_between
 from app.storage import emit
 from app.storage.tables import Plan, PolicyRow, Project, Segmentation, ToolRow
 from app.workflow.context import Context
@@ -19,6 +21,8 @@ from app.workflow.lookup import found, present, ready_segmentation, standing
 from app.workflow.values import interactions_from
 
 Json = dict[str, Any]
+
+BOUND_SECONDS = 3.0  # for how far an order that is not proved may be above the cheapest
 
 
 def list_policies(ctx: Context, project_id: str) -> list[Json]:
@@ -50,8 +54,10 @@ def make_plan(ctx: Context, policy_id: str, tool_id: str) -> Json:
     Raises:
         StalePolicy: The tool has another feature set than the policy was learned with.
     """
-    found_plan = ctx.store.read(lambda session: _predict(ctx, session, policy_id, tool_id))
-    cut_id, prediction, milliseconds = found_plan
+    cut_id, problem, policy_of_plan = ctx.store.read(lambda session: _to_predict(ctx, session, policy_id, tool_id))
+    started = time.perf_counter()
+    prediction = predict(problem, policy_of_plan, _deadline(BOUND_SECONDS))
+    milliseconds = 1000 * (time.perf_counter() - started)
 
     def change(session: Session) -> Json:
         policy = found(session, PolicyRow, policy_id, "policy")
@@ -127,6 +133,7 @@ def policy_json(row: PolicyRow) -> Json:
         if effort is None
         else [{"key": key, "label": label, "value": value} for (key, label), value in zip(EFFORT_COLUMNS, effort, strict=True)],
         "converged": row.converged,
+        "certificate": row.certificate,
         "learned_from": row.learned_from,
         "created_at": row.created_at,
     }
@@ -145,6 +152,7 @@ def plan_json(ctx: Context, session: Session, row: Plan) -> Json:
         "tool_name": found(session, ToolRow, row.tool_id, "tool").name,
         "sequence": row.sequence,
         **{key: row.result[key] for key in ("cost", "ties", "proved", "method", "effort", "tie_settled_by", "milliseconds")},
+        **_sureness(row.result),
         "orders": f"{math.factorial(len(row.sequence)):,}",
         "features": [{"key": c.key, "label": c.label, "symbol": c.symbol} for c in _columns(policy)],
         "steps": [
@@ -162,15 +170,47 @@ def _columns(row: PolicyRow) -> tuple[Feature, ...]:
     return features.columns + added
 
 
-def _predict(ctx: Context, session: Session, policy_id: str, tool_id: str) -> tuple[str, Prediction, float]:
+def _sureness(result: Json) -> Json:
+    """The bound, the gap and one sentence; plans made before there were bounds have none."""
+    bound = result.get("bound", result["cost"] if result["proved"] else None)
+    gap = None if bound is None else gap_between(result["cost"], bound)
+    if gap is not None and not math.isfinite(gap):
+        gap = None
+    return {"bound": bound, "gap": gap, "sureness": sureness_words(cost=result["cost"], proved=result["proved"], bound=bound)}
+
+
+def sureness_words(cost: float, proved: bool, bound: float | None) -> str:
+    """'Proved optimal', or how far the order may be above the optimum at most; in units of cost where a share means nothing."""
+    if proved:
+        return "Proved optimal"
+    if bound is None:
+        return "Best found, no limit known"
+    if bound > 0.01 * abs(cost):
+        percent = 100 * (cost - bound) / bound
+        shown = f"{math.ceil(10 * percent) / 10:.1f}" if percent < 10 else f"{math.ceil(percent)}"
+        return f"Best found, at most {shown} % above the optimum"
+    return f"Best found, at most {cost - bound:.3g} above the optimum"
+
+
+def _to_predict(ctx: Context, session: Session, policy_id: str, tool_id: str) -> tuple[str, SequencingProblem, Policy]:
     policy = found(session, PolicyRow, policy_id, "policy")
     cut = ready_segmentation(session, present(session, ToolRow, tool_id))
-    started = time.perf_counter()
-    problem = ctx.values.problem(session, cut, interactions_from(policy.interactions)) if cut.feature_set == policy.feature_set else None
-    if problem is None:
-        problem = ctx.values.problem(session, cut, ())  # another feature set: `predict` refuses it in words
-    prediction = predict(problem, policy_value(policy))
-    return cut.id, prediction, 1000 * (time.perf_counter() - started)
+    same = cut.feature_set == policy.feature_set
+    # another feature set: `predict` refuses it in words
+    problem = ctx.values.problem(session, cut, interactions_from(policy.interactions) if same else ())
+    return cut.id, problem, policy_value(policy)
+
+
+def _deadline(seconds: float) -> Callable[[], bool]:
+    """True from `seconds` after its first use."""
+    end: list[float] = []
+
+    def over() -> bool:
+        if not end:
+            end.append(time.monotonic() + seconds)
+        return time.monotonic() > end[0]
+
+    return over
 
 
 def _result(prediction: Prediction, milliseconds: float) -> Json:
@@ -178,6 +218,7 @@ def _result(prediction: Prediction, milliseconds: float) -> Json:
         "cost": float(prediction.cost),
         "ties": int(prediction.ties),
         "proved": bool(prediction.proved),
+        "bound": float(prediction.bound) if math.isfinite(prediction.bound) else None,
         "method": prediction.method,
         "effort": None if prediction.effort is None else float(prediction.effort),
         "tie_settled_by": prediction.tie_settled_by,

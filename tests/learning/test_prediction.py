@@ -88,3 +88,13 @@ NAMES, DESCRIPTIONS = ("A", "B", "C", "D"), ("Floor", "Left wall", "", "Rim")
 )
 def test_differences_in_words(left, right, text):
     assert describe_difference(NAMES, DESCRIPTIONS, left, right) == text
+
+
+def test_too_many_regions_come_with_a_bound_that_patience_only_improves():
+    problem = problem_for(grid_graph(5, 6, 3))
+    hasty, patient = predict(problem, POLICY, should_stop=lambda: True), predict(problem, POLICY)
+    assert not patient.proved
+    assert hasty.sequence == patient.sequence
+    assert 0 < hasty.bound < patient.bound < patient.cost
+    assert patient.gap == pytest.approx((patient.cost - patient.bound) / patient.cost)
+    assert patient.gap < 0.3

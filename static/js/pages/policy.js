@@ -10,7 +10,7 @@ import { boot, pageAddress, query, remember, showFault } from "../shell.js";
 import { Stepper } from "../stepper.js";
 import { complain } from "../toasts.js";
 import { View3D } from "../view3d.js";
-import { number, plural, sentence } from "../words.js";
+import { number, plural } from "../words.js";
 
 const CAUSES = 5; // named in the chart; the rest is one grey bar
 
@@ -139,8 +139,8 @@ function paintHead() {
 function paintProof() {
   const { plan } = state;
   parts.proof.dataset.proved = String(plan.proved);
-  fill(parts.proof, icon(plan.proved ? "shield" : "warn"), h("div", {}, h("b", {}, plan.proved ? "Proved cheapest" : "Best found"),
-    h("span.small.muted", {}, plan.proved ? `All ${plan.orders} orders, in ${number(plan.milliseconds, 2)} ms` : `${sentence(plan.method)}. No proof for ${plural(plan.sequence.length, "region")}.`)));
+  fill(parts.proof, icon(plan.proved ? "shield" : "warn"), h("div", {}, h("b", {}, plan.sureness),
+    h("span.small.muted", { dataset: plan.proved ? {} : { tip: plan.method } }, plan.proved ? `Cheapest of all ${plan.orders} orders, in ${number(plan.milliseconds, 2)} ms` : `${plural(plan.sequence.length, "region")} are too many to look at every order${plan.bound === null ? "" : `; none costs less than ${number(plan.bound)}`}.`)));
   const fact = (term, value, tip = null) => h("div.fact", { dataset: tip ? { tip } : {} }, h("dt", {}, term), h("dd", {}, value));
   fill(parts.facts, fact("Cost", number(plan.cost), "C = w · Φ, added along the order; low is good"),
     fact("Equally cheap", plan.ties === 1 ? "this one only" : `${Number(plan.ties).toLocaleString("en")} orders`, "Orders in the lowest cost class (relative 1e-7)"),
