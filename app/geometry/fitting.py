@@ -95,7 +95,7 @@ def solve3(a, b):  # pragma: no cover - compiled
 
 
 @nb.njit(cache=True)
-def _round_fit(m, across, spread, g, centre):  # pragma: no cover - compiled
+def round_fit(m, across, spread, g, centre):  # pragma: no cover - compiled
     """Algebraic sphere (across = identity) or cylinder (across drops the axis): int (s - 2 c.x - d)^2 / (4 r^2).
 
     Here x is the position from the centroid g and s = x^T across x. Fills centre; returns (error, radius).
@@ -169,7 +169,7 @@ def fit(m, weight, out):  # pragma: no cover - compiled
             for a in range(3):
                 for b in range(3):
                     across[a, b] -= axis[a] * axis[b]
-        error, radius = _round_fit(m, across, spread, g, centre)
+        error, radius = round_fit(m, across, spread, g, centre)
         if error >= NO_FIT:
             continue
         radial = 0.0  # sum of A n . across (x - centre): positive when normals point away from the centre

@@ -44,7 +44,8 @@ class MergeTree:
         Args:
             target: Number of labels wanted; there are more when the surface has more connected pieces.
             tolerance: Largest RMS cost of a cluster / diagonal; what a merge adds to the cost may be FORCED times as much on the
-                smaller side, so that a small feature isn't lost in a large region. With both, as many as the tolerance asks for, at most `target`.
+                smaller side, so that a small feature isn't lost in a large region. With both, as many as the tolerance asks
+                for, at most `target`.
         """
         if target is None and tolerance is None:
             raise InvalidInput("Say how many regions are wanted, or how closely they must fit.")
@@ -88,8 +89,8 @@ class MergeTree:
     def to_bytes(self) -> bytes:
         """A compressed npz file."""
         buffer = io.BytesIO()
-        arrays = {"leaf": self.leaf.astype(np.int32), "merges": self.merges.astype(np.int32)}
-        np.savez_compressed(buffer, **arrays, costs=self.costs, areas=self.areas)
+        leaf, merges = self.leaf.astype(np.int32), self.merges.astype(np.int32)
+        np.savez_compressed(buffer, leaf=leaf, merges=merges, costs=self.costs, areas=self.areas)
         return buffer.getvalue()
 
     @staticmethod

@@ -193,3 +193,21 @@ def fit_any(m, weight, freeform, out):  # pragma: no cover - compiled
             best = cost
             out[0], out[1], out[2], out[3], out[4] = QUADRIC, 0.0, 0.0, 0.0, 0.0
     return best
+
+
+@nb.njit(cache=True)
+def misfit(sums, q, weight):  # pragma: no cover - compiled
+    """int f^2 + weight^2 int |grad f - n|^2 of each row of sums (F, 54) for a given quadric q."""
+    square, result = weight * weight, np.empty(len(sums))
+    for r in range(len(sums)):
+        m, total = sums[r], square * sums[r, AREA]
+        for i in range(10):
+            for j in range(10):
+                total += q[i] * q[j] * m[PRODUCT[i, j]]
+        for t in range(len(_TERM_BY)):
+            i, j = _TERM_AT[t, 0], _TERM_AT[t, 1]
+            total += (1.0 if i == j else 2.0) * square * _TERM_BY[t] * m[_TERM_AT[t, 2]] * q[i] * q[j]
+        for t in range(len(_SLOPE_BY)):
+            total -= 2 * square * _SLOPE_BY[t] * m[_SLOPE_AT[t, 1]] * q[_SLOPE_AT[t, 0]]
+        result[r] = max(total, 0.0)
+    return result

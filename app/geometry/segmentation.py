@@ -1,7 +1,7 @@
 """Cut a part's working surface into a handful of regions (Sec. V).
 
-CAD faces, where the file has them, or single triangles are merged greedily into planes, cylinders and spheres; the part
-that can be reached from above is kept; small pieces and holes go to their surroundings, large ones are cut by planes.
+CAD faces, where the file has them, or single triangles are merged greedily into planes, cylinders, spheres, cones and freeform
+patches; the part that can be reached from above is kept; small pieces and holes go to their surroundings, large ones are cut.
 """
 
 from collections.abc import Callable
@@ -13,16 +13,21 @@ from numpy.typing import NDArray
 
 from app.errors import InvalidInput, UnreadableMesh
 from app.geometry.cleaning import face_pairs
-from app.geometry.fitting import AREA, NORMAL_WEIGHT, SIZE, face_sums, fit
+from app.geometry.denoise import denoised
+from app.geometry.fitting import AREA, NORMAL_WEIGHT, PLANE, PRODUCT, SIZE, face_sums
 from app.geometry.importing import ImportedPart
 from app.geometry.merge_tree import Integers, MergeTree
 from app.geometry.merging import build_tree
-from app.geometry.splitting import Surface, connected, split_large
+from app.geometry.quadrics import fit_any
+from app.geometry.relaxing import relaxed
+from app.geometry.splitting import LARGE, Surface, connected, split_large
 from app.geometry.tool import Array, Mesh
 from app.geometry.working_surface import reachable
 
 Report = Callable[[float, str], None]
 MOST_TARGET = 60
+FILLET_WIDTH = 0.06  # of the diagonal; wider roundings are regions of their own
+SIMILAR_LEAST, SIMILAR_MOST = 0.04, 0.13  # shares of the working surface between which the paper-like regions lie, roughly
 LEAST_REGIONS = 6  # fewer primitives than this are cut further, as one region leaves nothing to sequence
 
 
@@ -70,30 +75,41 @@ def segment(part: ImportedPart, parameters: SegmentationParameters, report: Repo
     mesh = part.mesh
     report(0.0, "Looking for neighbouring triangles")
     pairs = face_pairs(mesh.faces)
-    sums = _unit_sums(mesh)
-    tree = tree or part_tree(part, lambda f: report(0.2 + 0.6 * f, "Fitting planes, cylinders and spheres"))
+    sums = unit_sums(_fitted(part, parameters))
+    tree = tree or part_tree(part, lambda f: report(0.1 + 0.7 * f, "Fitting planes, cylinders, spheres and cones"), parameters.denoise)
     report(0.8, "Finding what can be reached from above")
     seen = reachable(mesh)
-    patch = tree.cut(tolerance=parameters.tolerance)
-    labels = _working_patches(patch, seen, sums[:, AREA], pairs)
+    labels = _working_patches(tree.cut(tolerance=parameters.tolerance), seen, sums[:, AREA], pairs)
     report(0.85, "Merging small pieces")
-    labels = _merge_small(labels, sums, pairs, parameters.minimum_area, parameters.target or 1)
+    similar = parameters.preset == "paper-like"
+    if parameters.absorb_fillets or similar:
+        labels = _absorb_fillets(labels, sums, pairs)
+    smallest = SIMILAR_LEAST if similar else parameters.minimum_area
+    labels = _merge_small(labels, sums, pairs, smallest, parameters.target or 1)
     wanted = parameters.target or parameters.most
     labels = _merge_down(labels, sums, pairs, wanted)
+    if parameters.denoise and (part.cad_face < 0).all():
+        labels = relaxed(labels, sums, pairs, NORMAL_WEIGHT)
     report(0.9, "Cutting large pieces")
     least = min(parameters.target or LEAST_REGIONS, wanted)
     start = Surface(mesh.vertices, mesh.faces.astype(np.int64), part.cad_face, labels, np.arange(len(labels)))
-    surface = split_large(start, least, wanted)
+    surface = split_large(start, least, wanted, SIMILAR_MOST if similar else LARGE)
     report(1.0, f"{surface.labels.max() + 1} regions")
     finer = replace(part, mesh=Mesh(surface.vertices, surface.faces.astype(np.int32)), cad_face=surface.cad_face)
     return Cut(finer, surface.labels.astype(np.int32), tree.on(surface.source), surface.source)
 
 
-def part_tree(part: ImportedPart, progress: Callable[[float], None] = lambda _: None) -> MergeTree:
+def part_tree(part: ImportedPart, progress: Callable[[float], None] = lambda _: None, denoise: bool = False) -> MergeTree:
     """Merge the faces of a part, or its CAD faces, until each connected piece is one cluster."""
     pairs = face_pairs(part.mesh.faces)
     leaf = _first_clusters(part.cad_face, pairs)
-    return build_tree(_add_up(_unit_sums(part.mesh), leaf), leaf, leaf[pairs], progress)
+    sums = unit_sums(_fitted(part, SegmentationParameters(denoise=denoise)))
+    return build_tree(_add_up(sums, leaf), leaf, leaf[pairs], progress)
+
+
+def _fitted(part: ImportedPart, parameters: SegmentationParameters) -> Mesh:
+    """The mesh to which primitives are fitted; a file with CAD faces is no scan."""
+    return denoised(part.mesh) if parameters.denoise and (part.cad_face < 0).all() else part.mesh
 
 
 def _check(parameters: SegmentationParameters) -> None:
@@ -103,7 +119,7 @@ def _check(parameters: SegmentationParameters) -> None:
         raise InvalidInput(f"The tolerance {parameters.tolerance:g} is out of range; accepted are shares of the diagonal up to 0.1.")
 
 
-def _unit_sums(mesh: Mesh) -> Array:
+def unit_sums(mesh: Mesh) -> Array:
     """Sums per face in centred coordinates of unit diagonal: a far origin would eat the digits of the fourth powers."""
     middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
     return face_sums((mesh.vertices - middle) / np.linalg.norm(np.ptp(mesh.vertices, axis=0)), mesh.faces)
@@ -146,6 +162,24 @@ def _label_pairs(labels: Integers, pairs: Integers) -> Integers:
     return np.unique(np.sort(both, axis=1), axis=0)
 
 
+def _absorb_fillets(labels: Integers, sums: Array, pairs: Integers) -> Integers:
+    """Give each narrow bent region to the larger neighbour that it fits best."""
+    total, touching = _add_up(sums, labels), _label_pairs(labels, pairs)
+    out, into = np.empty(5), np.arange(len(total))
+    for k in np.argsort(total[:, AREA]):
+        m, others = total[k], np.unique(touching[(touching == k).any(axis=1)])
+        others = others[(others != k) & (total[others, AREA] > m[AREA])]
+        fit_any(m, NORMAL_WEIGHT, True, out)
+        middle = m[PRODUCT[0, 1:4]] / m[0]
+        along = np.sqrt(12 * np.linalg.eigvalsh(m[PRODUCT[1:4, 1:4]] / m[0] - np.outer(middle, middle))[-1])
+        if out[0] == PLANE or len(others) < 2 or m[AREA] / along > FILLET_WIDTH:
+            continue
+        into[k] = others[int(np.argmin([_cost(m + total[o]) - _cost(total[o]) for o in others]))]
+    while (into != into[into]).any():
+        into = into[into]
+    return _renumber(np.where(labels >= 0, into[labels], -1))
+
+
 def _merge_small(labels: Integers, sums: Array, pairs: Integers, minimum_area: float, wanted: int) -> Integers:
     """Give regions below the minimum area, smallest first, to the neighbour they fit best while there are more than wanted.
 
@@ -175,7 +209,7 @@ def _merge_small(labels: Integers, sums: Array, pairs: Integers, minimum_area: f
 
 
 def _cost(sums: Array) -> float:
-    return float(fit(sums, NORMAL_WEIGHT, np.empty(5)))
+    return float(fit_any(sums, NORMAL_WEIGHT, True, np.empty(5)))
 
 
 def _merge_down(labels: Integers, sums: Array, pairs: Integers, wanted: int) -> Integers:

@@ -42,11 +42,11 @@ class Surface:
         return area / area.sum()
 
 
-def split_large(surface: Surface, least: int, most: int) -> Surface:
-    """Cut the largest regions until there are `least` and none is large, but never more than `most`."""
+def split_large(surface: Surface, least: int, most: int, large: float = LARGE) -> Surface:
+    """Cut the largest regions until there are `least` and none has a larger share than `large`, but never more than `most`."""
     for _ in range(ROUNDS):
         shares = surface.shares()
-        parts = _parts(shares, least, most)
+        parts = _parts(shares, least, most, large)
         if (parts == 1).all():
             break
         room = most - int(parts.sum())
@@ -107,10 +107,10 @@ def _turned(faces: Integers, middle: Integers, chosen: Integers, first: Integers
     return corners[:, 0], corners[:, 1], corners[:, 2], new[:, 0], new[:, 2]
 
 
-def _parts(shares: Array, least: int, most: int) -> Integers:
+def _parts(shares: Array, least: int, most: int, large: float) -> Integers:
     """Into how many parts each region is cut (N,): always one more for the largest parts."""
     parts = np.ones(len(shares), np.int64)
-    while parts.sum() < most and (parts.sum() < least or (shares / parts).max() > LARGE):
+    while parts.sum() < most and (parts.sum() < least or (shares / parts).max() > large):
         parts[np.argmax(shares / parts)] += 1
     return parts
 

@@ -5,10 +5,11 @@ import pytest
 import trimesh
 from numpy.typing import NDArray
 
+from app.benches.composites import noisy, rand_index, strip
 from app.geometry.cleaning import CleaningReport
 from app.geometry.importing import ImportedPart, load_part
 from app.geometry.moulds import Piece, solid, straight, trace, translational
-from app.geometry.segmentation import SegmentationParameters, segment
+from app.geometry.segmentation import SegmentationParameters, part_tree, segment
 from app.geometry.tool import Mesh
 from tests.conftest import shared
 
@@ -24,15 +25,6 @@ def composite() -> tuple[Mesh, NDArray[np.int32]]:
 
 def part_of(mesh: Mesh) -> ImportedPart:
     return ImportedPart(mesh, np.full(len(mesh.faces), -1, np.int32), CleaningReport(()))
-
-
-def rand_index(a: NDArray[np.int32], b: NDArray[np.int32], weight: NDArray[np.float64]) -> float:
-    """Area-weighted adjusted Rand index (Hubert and Arabie 1985, counts replaced by areas)."""
-    table = np.zeros((a.max() + 1, b.max() + 1))
-    np.add.at(table, (a, b), weight)
-    table /= table.sum()
-    both, rows, columns = (table**2).sum(), (table.sum(1) ** 2).sum(), (table.sum(0) ** 2).sum()
-    return (both - rows * columns) / ((rows + columns) / 2 - rows * columns)
 
 
 def agreement(mesh: Mesh, found: NDArray[np.int32], truth: NDArray[np.int32]) -> float:
@@ -83,3 +75,47 @@ def test_public_parts_become_tools_of_similar_regions(name: str, units: str, up:
         faces = np.flatnonzero(cut.labels == region)
         pairs = mesh.face_adjacency[np.isin(mesh.face_adjacency, faces).all(axis=1)]
         assert len(trimesh.graph.connected_components(pairs, nodes=faces)) == 1
+
+
+def test_a_scan_is_cut_where_its_primitives_end() -> None:
+    """0.05 % of the diagonal of noise; smooth joints, no creases: without the switch the borders are ragged."""
+    rng = np.random.default_rng(1)
+    scanned = strip(6000, rng)
+    areas = trimesh.triangles.area(scanned.mesh.vertices[scanned.mesh.faces])
+    rough = part_of(noisy(scanned.mesh, 5e-4, rng))
+    index = {}
+    for denoise in (False, True):
+        cut = segment(rough, SegmentationParameters(target=5, denoise=denoise, minimum_area=0.01))
+        index[denoise] = rand_index(cut.labels, scanned.truth, areas)
+    assert index[True] > 0.95 > index[False]
+
+
+def test_fillets_are_absorbed_on_request() -> None:
+    """Two planes and a rounding of 24 mm between them: three primitives, two without the rounding."""
+    mesh, _ = solid(*translational(trace((Piece(0, 0.2), Piece(1, 0.024, BEND), Piece(2, 0.2))), straight(0.2, 1)))
+    found = {}
+    for absorb in (False, True):
+        cut = segment(part_of(mesh), SegmentationParameters(minimum_area=1e-4, absorb_fillets=absorb, most=40))
+        solid_part = trimesh.Trimesh(cut.part.mesh.vertices, cut.part.mesh.faces, process=False)
+        regions = [cut.labels == k for k in range(cut.labels.max() + 1)]
+        means = [np.average(solid_part.face_normals[r, 2], weights=solid_part.area_faces[r]) for r in regions]
+        found[absorb] = sum(0.6 < mean < 0.95 for mean in means)  # level is 1, the slope 0.5
+    assert found[False] > 0
+    assert found[True] == 0
+
+
+@pytest.mark.parametrize(("name", "units", "up"), [("1002_tray_bottom.STL", "mm", "+y"), ("naca0012.stl", "m", "+z")])
+def test_paper_like_regions_are_similar(name: str, units: str, up: str) -> None:
+    part = load_part(shared("cad", name), name, units, up)
+    cut = segment(part, SegmentationParameters(preset="paper-like"))
+    areas = trimesh.triangles.area(cut.part.mesh.vertices[cut.part.mesh.faces])
+    size = np.bincount(cut.labels[cut.labels >= 0], weights=areas[cut.labels >= 0])
+    assert 6 <= len(size) <= 14
+    assert size.max() / size.sum() < 0.25
+
+
+def test_a_kept_tree_gives_the_same_cut() -> None:
+    part = part_of(composite()[0])
+    first = segment(part, SegmentationParameters(target=7))
+    again = segment(part, SegmentationParameters(target=7), tree=part_tree(part))
+    assert (first.labels == again.labels).all()
