@@ -12,6 +12,7 @@ from app.workflow import runs as workflow
 router = APIRouter(tags=["runs"], route_class=ActionRoute)
 
 Kind = Literal["performance", "effort"]
+Mode = Literal["certified", "paper"]
 ParameterName = Annotated[str, Field(max_length=60)]
 ParameterValue = bool | int | float
 
@@ -20,6 +21,7 @@ class NewRun(Body):
     """What to learn; parameters left out take the values of /run-defaults."""
 
     kind: Kind
+    mode: Annotated[Mode, Field(description="How a performance run learns: with proof, or Algorithm 1 as printed.")] = "certified"
     params: Annotated[dict[ParameterName, ParameterValue], Field(default_factory=dict)]
     seed: Seed | None = None
 
@@ -40,26 +42,18 @@ class ParameterList(Row):
     parameters: list[Parameter]
 
 
-class Terms(Row):
-    """The parts of the loss (Eq. 7)."""
-
-    alpha: float
-    beta: float
-    gamma: float
-    regularisation: float
-
-
 class Run(Row):
     """Where a learner stands."""
 
     id: str
     project_id: str
     kind: Kind
+    mode: Mode | None
     state: str
     round: int
     iteration: int
     loss: float | None
-    terms: Terms | None
+    terms: dict[str, float] | None  # parts of the loss (Eq. 7), or of what a certified run has still open
     violations: int | None
     seed: int
     params: Json
@@ -70,6 +64,7 @@ class Run(Row):
     policy_id: str | None
     message: str
     error: Json | str | None
+    report: Json | None  # certified: what is proved, and how sure each tool is
     tools: list[str]
     version: int
     created_at: str
@@ -88,7 +83,7 @@ class Metric(Row):
 
     iteration: int
     loss: float
-    terms: Terms
+    terms: dict[str, float]
     violations: int
 
 
@@ -106,15 +101,15 @@ def list_runs(ctx: Ctx, project_id: str, paging: Paging) -> RunPage:
 
 
 @router.get("/projects/{project_id}/run-defaults", response_model=ParameterList)
-def run_defaults(ctx: Ctx, project_id: str, kind: Kind) -> Json:
+def run_defaults(ctx: Ctx, project_id: str, kind: Kind, mode: Mode = "certified") -> Json:
     """The hyperparameters with symbols, words and default values."""
-    return workflow.run_defaults(ctx, project_id, kind)
+    return workflow.run_defaults(ctx, project_id, kind, mode)
 
 
 @router.post("/projects/{project_id}/runs", status_code=202, response_model=Run)
 def start_run(ctx: Ctx, project_id: str, body: NewRun, response: Response, _key: IdempotencyKey = None) -> Json:
     """Start a learner in the background."""
-    return located(response, "runs", workflow.start_run(ctx, project_id, body.kind, body.params, body.seed))
+    return located(response, "runs", workflow.start_run(ctx, project_id, body.kind, body.params, body.seed, body.mode))
 
 
 @router.get("/runs/{run_id}", response_model=Run)

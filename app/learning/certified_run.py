@@ -87,6 +87,7 @@ def certified_step(
     state: CertifiedState,
     answers: Answers,
     memory: Memory | None = None,
+    gone: frozenset[int] = frozenset(),
 ) -> CertifiedResult:
     """Learn from all that is known and ask what is open; pure and deterministic.
 
@@ -97,6 +98,7 @@ def certified_step(
         state: As the last step returned it.
         answers: All answers of the run so far by fingerprint; leaving one out re-opens its question.
         memory: Of earlier steps of this run; gets what this one finds.
+        gone: Tools that nobody is interested in any more; they are not asked about.
 
     Returns:
         New state, and questions or the end of the run.
@@ -106,10 +108,13 @@ def certified_step(
     given = tuple((q.fingerprint, answers[q.fingerprint]) for q in state.asked if q.fingerprint in answers)
     known = _known(demonstrations, tools, parameters, state, given, memory or Memory.empty())
     usable = _usable(known)
-    outlooks = {t: outlook(p, known.pool.frame, known.explored, parameters.tolerance) for t, p in enumerate(tools)} if usable else {}
+    wanted = {t: p for t, p in enumerate(tools) if usable and t not in gone}
+    outlooks = {t: outlook(p, known.pool.frame, known.explored, parameters.tolerance) for t, p in wanted.items()}
     unanswered = tuple(q for q in state.asked if q.fingerprint not in answers)
     fresh = () if unanswered or not usable else _fresh(state, parameters, known, outlooks)
-    u = known.explored.centre if usable else compromise(known.pool, known.members, _prior(parameters))
+    u = known.explored.centre
+    if known.explored.cone.empty or (known.contradiction and not known.contradiction.clear):
+        u = compromise(known.pool, known.members, _prior(parameters))
     proof = certificate(known.pool, u, known.explored, usable, count_ties=not (fresh or unanswered))
     report = _report(demonstrations, proof, outlooks, known)
     metric = _metric(state, report)
@@ -160,6 +165,9 @@ def _base(demonstrations: Demonstrations, tools: Tools, parameters: CertifiedPar
     found = None
     if not _explains(pool, everyone, explored):
         found = find_contradiction(len(everyone), lambda members: 0.0 if fits(pool, members, prior) else left_over(pool, members, prior))
+        if found and found.clear and found.rest:  # the compromise follows those that agree
+            followed = tuple(i for i in everyone if i not in found.odd)
+            explored = explore(pool, followed, prior, np.random.default_rng([seed, 1]))
     return Known(pool, everyone, rows, explored, (), frozenset(), frozenset(), found)
 
 

@@ -111,9 +111,11 @@ def active_run(session: Session, project_id: str) -> Run | None:
 
 
 def run_training_on(session: Session, tool_id: str) -> Run | None:
-    """An active run that uses the tool."""
+    """An active run that learns from the tool, or has an open question about it."""
     wanted = select(Run).join(RunDemonstration, col(RunDemonstration.run_id) == col(Run.id))
-    return session.exec(wanted.where(RunDemonstration.tool_id == tool_id, col(Run.state).in_(ACTIVE_RUN_STATES))).first()
+    learns = session.exec(wanted.where(RunDemonstration.tool_id == tool_id, col(Run.state).in_(ACTIVE_RUN_STATES))).first()
+    asks = select(Run).join(Query, col(Query.run_id) == col(Run.id)).where(Query.tool_id == tool_id, Query.state == "open")
+    return learns or session.exec(asks.where(col(Run.state).in_(ACTIVE_RUN_STATES))).first()
 
 
 def refuse_training_on(session: Session, tool: ToolRow) -> None:

@@ -17,6 +17,7 @@ Json = dict[str, Any]
 TITLES = {
     "similarity": "Would the right order be just as good as yours?",
     "preference": "Which of these two orders is less effort for you?",
+    "pair": "Which of these two orders would you work in?",
 }
 CHOICES: dict[str, list[Json]] = {
     "similarity": [
@@ -31,9 +32,17 @@ CHOICES: dict[str, list[Json]] = {
         {"value": "cant_tell", "label": "Can't tell", "hint": "", "key": "0"},
     ],
 }
+CHOICES["pair"] = [
+    {"value": "left", "label": "The left one", "hint": "that is how I would do it", "key": "1"},
+    {"value": "right", "label": "The right one", "hint": "that is how I would do it", "key": "2"},
+    {"value": "equal", "label": "About equal", "hint": "either is fine", "key": "3"},
+    {"value": "both_wrong", "label": "Both are wrong", "hint": "I would show another order", "key": "4"},
+    {"value": "cant_tell", "label": "Can't tell", "hint": "", "key": "0"},
+]
 SIDES = {
     "similarity": (("Yours", "{name}, recorded"), ("Other", "by what is learned so far at least as good")),
     "preference": (("Left", "as good as the other"), ("Right", "as good as the other")),
+    "pair": (("Left", "nobody has recorded this tool"), ("Right", "nobody has recorded this tool")),
 }
 
 
@@ -130,7 +139,7 @@ def undo_answer(ctx: Context, answer_id: str) -> Json:
 def query_json(session: Session, row: Query) -> Json:
     """The question as REST shows it."""
     tool = found(session, ToolRow, row.tool_id, "tool")
-    shown = found(session, Demonstration, row.demonstration_id, "demonstration")
+    shown = found(session, Demonstration, row.demonstration_id, "demonstration") if row.demonstration_id else None
     given = current_answer(session, row.id)
     together = session.exec(select(Query.id).where(Query.run_id == row.run_id, Query.round == row.round, Query.state != "withdrawn")).all()
     (left, left_note), (right, right_note) = SIDES[row.kind]
@@ -143,7 +152,7 @@ def query_json(session: Session, row: Query) -> Json:
         "tool_id": row.tool_id,
         "tool_name": tool.name,
         "title": TITLES[row.kind],
-        "left": {"label": left, "note": left_note.format(name=shown.name), "sequence": row.left},
+        "left": {"label": left, "note": left_note.format(name=shown.name if shown else ""), "sequence": row.left},
         "right": {"label": right, "note": right_note, "sequence": row.right},
         "difference": row.difference,
         "why": row.why,

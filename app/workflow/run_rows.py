@@ -1,12 +1,12 @@
 """Runs as REST shows them, and the changes of state that several actions share."""
 
-from dataclasses import fields
 from typing import Any
 
 from sqlmodel import Session, col, func, select
 
 from app.errors import InvalidInput
 from app.jobs.rows import add_job
+from app.learning.certified_state import CERTIFIED_WORDS, CertifiedParameters
 from app.learning.effort import EFFORT_WORDS, EffortParameters
 from app.learning.performance import PARAMETER_WORDS, PerformanceParameters
 from app.sequencing.features import FEATURE_SETS
@@ -27,48 +27,55 @@ from app.storage.tables import (
 Json = dict[str, Any]
 
 TRAINING_JOB = "training"
-PARAMETERS: dict[str, type[PerformanceParameters] | type[EffortParameters]] = {
-    "performance": PerformanceParameters,
+PARAMETERS: dict[str, type[PerformanceParameters] | type[CertifiedParameters] | type[EffortParameters]] = {
+    "certified": CertifiedParameters,
+    "paper": PerformanceParameters,
     "effort": EffortParameters,
 }
-WORDS: dict[str, dict[str, tuple[str, str]]] = {"performance": PARAMETER_WORDS, "effort": EFFORT_WORDS}
+WORDS: dict[str, dict[str, tuple[str, str]]] = {"certified": CERTIFIED_WORDS, "paper": PARAMETER_WORDS, "effort": EFFORT_WORDS}
+MODES = ("certified", "paper")  # of a performance run, the default first
 MOST: dict[str, int] = {"iterations": 5000, "samples": 1000, "classes": 50, "rounds": 200, "batch": 50, "most": 200, "cap": 5000}
 UP_TO_ONE = ("zeta", "tolerance")
 
 
-def parameters_for(kind: str, params: Json) -> PerformanceParameters | EffortParameters:
+def learner(row: Run) -> str:
+    """Which learner a run has, as `PARAMETERS` names them."""
+    return "effort" if row.kind == "effort" else row.mode
+
+
+def parameters_for(learns: str, params: Json) -> PerformanceParameters | CertifiedParameters | EffortParameters:
     """Hyperparameters from what a person gave; the rest has default values.
 
     Raises:
         InvalidInput: An unknown name or a value out of range; says what is accepted.
     """
-    defaults = PARAMETERS[kind]()
+    defaults = PARAMETERS[learns]()
     known: dict[str, int | float] = {}
     for key, value in params.items():
-        if key not in WORDS[kind]:
-            raise InvalidInput(f"There is no parameter {key!r}. Known are: {', '.join(WORDS[kind])}.")
+        if key not in WORDS[learns]:
+            raise InvalidInput(f"There is no parameter {key!r}. Known are: {', '.join(WORDS[learns])}.")
         whole = isinstance(getattr(defaults, key), int)
-        label, most = WORDS[kind][key][1], MOST.get(key, 1 if key in UP_TO_ONE else 1_000_000)
+        label, most = WORDS[learns][key][1], MOST.get(key, 1 if key in UP_TO_ONE else 1_000_000)
         if isinstance(value, bool) or (whole and value != int(value)):
             raise InvalidInput(f"{label} is a {'whole number' if whole else 'number'}, not {value!r}.")
         if not (1 if whole else 0) <= value <= most:
             raise InvalidInput(f"{label} is between {1 if whole else 0} and {most:,}, not {value}.")
         known[key] = int(value) if whole else float(value)
-    return PARAMETERS[kind](**known)  # pyright: ignore[reportArgumentType]
+    return PARAMETERS[learns](**known)  # pyright: ignore[reportArgumentType]
 
 
-def parameter_rows(kind: str, params: Json) -> list[Json]:
+def parameter_rows(learns: str, params: Json) -> list[Json]:
     """Hyperparameters with symbol and words."""
-    values, defaults = parameters_for(kind, params), PARAMETERS[kind]()
+    values, defaults = parameters_for(learns, params), PARAMETERS[learns]()
     return [
         {
-            "key": f.name,
-            "symbol": WORDS[kind][f.name][0],
-            "label": WORDS[kind][f.name][1],
-            "value": getattr(values, f.name),
-            "default": getattr(defaults, f.name),
+            "key": key,
+            "symbol": symbol,
+            "label": label,
+            "value": getattr(values, key),
+            "default": getattr(defaults, key),
         }
-        for f in fields(PARAMETERS[kind])
+        for key, (symbol, label) in WORDS[learns].items()
     ]
 
 
@@ -81,6 +88,7 @@ def run_json(session: Session, row: Run) -> Json:
         "id": row.id,
         "project_id": row.project_id,
         "kind": row.kind,
+        "mode": row.mode if row.kind == "performance" else None,
         "state": row.state,
         "round": row.round,
         "iteration": row.iteration,
@@ -89,13 +97,14 @@ def run_json(session: Session, row: Run) -> Json:
         "violations": last.violations if last else None,
         "seed": row.seed,
         "params": row.params,
-        "parameters": parameter_rows(row.kind, row.params),
+        "parameters": parameter_rows(learner(row), row.params),
         "open_queries": states.get("open", 0),
         "asked": states.get("open", 0) + states.get("answered", 0),
         "answered": states.get("answered", 0),
         "policy_id": row.policy_id,
         "message": row.message,
         "error": row.error,
+        "report": checkpoint.report if (checkpoint := checkpoint_of(session, row)) else None,
         "tools": list(session.exec(tools)),
         "version": row.version,
         "created_at": row.created_at,
@@ -191,6 +200,7 @@ def write_policy(session: Session, row: Run, weights: list[float], identifiable:
         identifiable=identifiable if base is None else base.identifiable,
         effort_weights=None if base is None else weights,
         converged=converged,
+        certificate=base.certificate if base else checkpoint.report if (checkpoint := _last_checkpoint(session, row)) else None,
         learned_from=learned if base is None else {**learned, "answers": learned["answers"] + base.learned_from["answers"]},
     )
     session.add(policy)
@@ -198,6 +208,11 @@ def write_policy(session: Session, row: Run, weights: list[float], identifiable:
     row.policy_id = policy.id
     emit(session, "policy.changed", row.project_id, policy_id=policy.id)
     return policy
+
+
+def _last_checkpoint(session: Session, row: Run) -> RunCheckpoint | None:
+    session.flush()  # the one of this very step was only added
+    return checkpoint_of(session, row)
 
 
 def checkpoint_of(session: Session, row: Run) -> RunCheckpoint | None:

@@ -18,10 +18,10 @@ from app.storage.tables import (
     ToolRow,
 )
 from app.workflow.context import Context
-from app.workflow.lookup import check_tools, found, present, refuse_while_training, standing
+from app.workflow.lookup import check_tools, current_segmentation, found, present, refuse_while_training, standing, tools_of
 from app.workflow.queries import answer, get_query, list_queries, undo_answer
 from app.workflow.run_rows import (
-    PARAMETERS,
+    MODES,
     checkpoint_of,
     go,
     open_queries,
@@ -51,24 +51,24 @@ __all__ = [
 Json = dict[str, Any]
 
 DEFAULT_SEED = 1
+KINDS = ("performance", "effort")
 
 
-def run_defaults(ctx: Context, project_id: str, kind: str) -> Json:
+def run_defaults(ctx: Context, project_id: str, kind: str, mode: str = MODES[0]) -> Json:
     """The hyperparameters a new run would have."""
-    _check_kind(kind)
+    learns = _learner(kind, mode)
     ctx.store.read(lambda session: present(session, Project, project_id).id)
-    return {"parameters": parameter_rows(kind, {})}
+    return {"parameters": parameter_rows(learns, {})}
 
 
-def start_run(ctx: Context, project_id: str, kind: str, params: Json | None = None, seed: int | None = None) -> Json:
+def start_run(ctx: Context, project_id: str, kind: str, params: Json | None = None, seed: int | None = None, mode: str = MODES[0]) -> Json:
     """Start a learner on the demonstrations that count now.
 
     Raises:
         InvalidInput: Nothing to learn from, or an effort run without a policy to build on.
         RunActive: Another run of the project is not at its end.
     """
-    _check_kind(kind)
-    parameters_for(kind, params or {})
+    parameters_for(_learner(kind, mode), params or {})
 
     def change(session: Session) -> Json:
         project = present(session, Project, project_id)
@@ -78,6 +78,8 @@ def start_run(ctx: Context, project_id: str, kind: str, params: Json | None = No
         row = Run(
             project_id=project_id,
             kind=kind,
+            mode=mode,
+            interest=_interest(session, project_id, shown) if kind == "performance" and mode == "certified" else [],
             seed=DEFAULT_SEED if seed is None else seed,
             params=params or {},
             interactions=base.interactions if base else project.interactions,
@@ -179,9 +181,21 @@ def _compromise_words(session: Session, row: Run) -> str:
     return f"Finished with the best compromise between orders that contradict each other{between}."
 
 
-def _check_kind(kind: str) -> None:
-    if kind not in PARAMETERS:
-        raise InvalidInput(f"A run learns {' or '.join(PARAMETERS)}, not {kind!r}.")
+def _learner(kind: str, mode: str) -> str:
+    """Which learner is meant, as `run_rows` names them."""
+    if kind not in KINDS:
+        raise InvalidInput(f"A run learns {' or '.join(KINDS)}, not {kind!r}.")
+    if mode not in MODES:
+        raise InvalidInput(f"A run's mode is {' or '.join(MODES)}, not {mode!r}.")
+    return mode if kind == "performance" else kind
+
+
+def _interest(session: Session, project_id: str, shown: list[Demonstration]) -> list[str]:
+    """Segmentations of the other tools with the same features: what the weights are for, and what may be asked about."""
+    trained = {d.tool_id for d in shown}
+    features = found(session, Segmentation, shown[0].segmentation_id, "segmentation").feature_set
+    cuts = [current_segmentation(session, tool.id) for tool in tools_of(session, project_id) if tool.id not in trained]
+    return [cut.id for cut in cuts if cut is not None and cut.feature_set == features]
 
 
 def _latest_policy(session: Session, project_id: str) -> PolicyRow:

@@ -4,80 +4,26 @@ Each step is a pure function of checkpoint and answers, and is stored in one tra
 run's new state and the next job. So the same seed and answers give the same weights bit for bit, whenever it is interrupted.
 """
 
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-import numpy as np
 from sqlmodel import Session, col, select
 
 from app.jobs.dispatcher import Handler
 from app.jobs.rows import add_job
-from app.jobs.worker import Report
-from app.learning.differences import describe_difference
-from app.learning.effort import EffortParameters, EffortState, effort_step, start_effort
-from app.learning.performance import (
-    LearningDemonstration,
-    PerformanceParameters,
-    PerformanceState,
-    performance_step,
-    start_performance,
-)
-from app.learning.performance_conflict import Contradiction, contradiction_words
-from app.learning.qp import Array
-from app.sequencing.problem import SequencingProblem
+from app.learning.differences import PAIR, describe_difference
+from app.learning.performance import LearningDemonstration
+from app.learning.performance_conflict import contradiction_words
 from app.storage import emit
 from app.storage.tables import Demonstration, JobRow, Metric, PolicyRow, Query, Run, RunCheckpoint, RunDemonstration, Segmentation, ToolRow
-from app.workflow.lookup import found
-from app.workflow.run_rows import TRAINING_JOB, checkpoint_of, current_answer, go, parameters_for, write_policy
-from app.workflow.values import Kept, Values, interactions_from
+from app.workflow.lookup import current_segmentation, found, same_regions
+from app.workflow.run_rows import TRAINING_JOB, checkpoint_of, current_answer, go, learner, parameters_for, write_policy
+from app.workflow.training_step import Asked, Outcome, Step, compute
+from app.workflow.values import Values, interactions_from
 
 Json = dict[str, Any]
 
 KIND = TRAINING_JOB
-CHUNK = 25  # iterations per job: a few seconds at most between two checkpoints
-_problems = Kept(24)  # of a worker process: their tables are costly to build
-
-
-@dataclass(frozen=True)
-class Step:
-    """Everything a step needs."""
-
-    kind: str
-    keys: tuple[tuple[Any, ...], ...]  # of the problems, to recognise them
-    demonstrations: tuple[LearningDemonstration, ...]
-    parameters: PerformanceParameters | EffortParameters
-    seed: int
-    state: Json | None  # None: start
-    answers: dict[str, str]
-    base: tuple[float, ...]  # effort: the performance weights
-
-
-@dataclass(frozen=True)
-class Asked:
-    """A question of either kind."""
-
-    demonstration: int
-    left: tuple[int, ...]
-    right: tuple[int, ...]
-    why: str
-    differs: tuple[int, ...]
-    fingerprint: str
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What a step gave."""
-
-    state: Json
-    outcome: str
-    iteration: int
-    metrics: tuple[tuple[int, float, dict[str, float], int], ...]
-    questions: tuple[Asked, ...]
-    weights: tuple[float, ...]
-    identifiable: tuple[bool, ...]
-    message: str
-    contradiction: Contradiction | None = None
 
 
 def handler(values: Values) -> Handler:
@@ -105,23 +51,27 @@ def prepare(values: Values, session: Session, job: JobRow) -> Step | None:
         keys.append((cut.id, interactions))
     checkpoint = checkpoint_of(session, row)
     base = session.get(PolicyRow, row.based_on) if row.based_on else None
+    cuts = [found(session, Segmentation, key, "segmentation") for key in row.interest]
     return Step(
+        run_id=row.id,
         kind=row.kind,
         keys=tuple(keys),
         demonstrations=tuple(demonstrations),
-        parameters=parameters_for(row.kind, row.params),
+        parameters=parameters_for(learner(row), row.params),
         seed=row.seed,
         state=checkpoint.state if checkpoint else None,
         answers=_answers(session, row.id),
         base=tuple(base.weights) if base else (),
+        tools=tuple(values.problem(session, cut, interactions) for cut in cuts),
+        tool_keys=tuple((cut.id, interactions) for cut in cuts),
+        gone=frozenset(k for k, cut in enumerate(cuts) if _is_gone(session, cut)),
     )
 
 
-def compute(step: Step, report: Report) -> Outcome:
-    """One step of the learner; pure."""
-    report(0.05, "Comparing orders")
-    known = [LearningDemonstration(_known(key, d.problem), d.sequence) for key, d in zip(step.keys, step.demonstrations, strict=True)]
-    return _effort(step, known) if step.kind == "effort" else _performance(step, known)
+def _is_gone(session: Session, cut: Segmentation) -> bool:
+    """Whether a tool was deleted or cut into other regions since the run started."""
+    tool, now = session.get(ToolRow, cut.tool_id), current_segmentation(session, cut.tool_id)
+    return tool is None or tool.deleted_at is not None or now is None or not same_regions(session, cut.id, now)
 
 
 def finish(values: Values, session: Session, job: JobRow, out: Outcome) -> None:
@@ -135,7 +85,7 @@ def finish(values: Values, session: Session, job: JobRow, out: Outcome) -> None:
     row.checkpoint += 1
     if out.questions:
         _ask(values, session, row, out.questions)
-    session.add(_checkpoint(row, out))
+    session.add(_checkpoint(session, row, out))
     if out.outcome == "training":
         go(session, row, "training", out.message)
         add_job(session, KIND, row.project_id, row.id, job.title)
@@ -159,53 +109,14 @@ def demonstrations_of(session: Session, run_id: str) -> list[Demonstration]:
     return list(session.exec(wanted.where(RunDemonstration.run_id == run_id).order_by(col(RunDemonstration.position))))
 
 
-def _known(key: tuple[Any, ...], problem: SequencingProblem) -> SequencingProblem:
-    return _problems.get(key, lambda: problem)
-
-
-def _performance(step: Step, demonstrations: list[LearningDemonstration]) -> Outcome:
-    assert isinstance(step.parameters, PerformanceParameters)
-    state = PerformanceState.from_json(step.state) if step.state else start_performance(demonstrations, step.parameters, step.seed)
-    result = performance_step(demonstrations, step.parameters, state, step.answers, CHUNK)
-    return Outcome(
-        state=result.state.to_json(),
-        outcome=result.outcome,
-        iteration=result.state.iteration,
-        metrics=tuple((m.iteration, float(m.loss), {k: float(v) for k, v in m.terms.items()}, int(m.violations)) for m in result.metrics),
-        questions=tuple(
-            Asked(q.demonstration, demonstrations[q.demonstration].sequence, q.candidate, q.why, q.differs, q.fingerprint)
-            for q in result.questions
-        ),
-        weights=_floats(result.weights),
-        identifiable=tuple(bool(x) for x in result.state.identifiable),
-        message=result.message,
-        contradiction=result.contradiction,
-    )
-
-
-def _effort(step: Step, demonstrations: list[LearningDemonstration]) -> Outcome:
-    assert isinstance(step.parameters, EffortParameters)
-    if step.state:
-        state = EffortState.from_json(step.state)
-    else:
-        state = start_effort(demonstrations, np.array(step.base), step.parameters, step.seed)
-    result = effort_step(demonstrations, step.parameters, state, step.answers)
-    asked = tuple(Asked(q.demonstration, q.left, q.right, q.why, q.differs, q.fingerprint) for q in result.questions)
-    weights = _floats(result.effort_weights)
-    return Outcome(result.state.to_json(), result.outcome, 0, (), asked, weights, tuple(True for _ in weights), result.message)
-
-
-def _floats(values: Array) -> tuple[float, ...]:
-    return tuple(float(x) for x in values)
-
-
 def _answers(session: Session, run_id: str) -> dict[str, str]:
     queries = session.exec(select(Query).where(Query.run_id == run_id, Query.state == "answered").order_by(col(Query.id)))
     return {query.fingerprint: answer.value for query in queries.all() if (answer := current_answer(session, query.id))}
 
 
-def _checkpoint(row: Run, out: Outcome) -> RunCheckpoint:
+def _checkpoint(session: Session, row: Run, out: Outcome) -> RunCheckpoint:
     return RunCheckpoint(
+        report=None if out.report is None else _named(session, row, out.report),
         run_id=row.id,
         number=row.checkpoint,
         round=row.round,
@@ -225,33 +136,58 @@ def _ask(values: Values, session: Session, row: Run, questions: tuple[Asked, ...
     if not again:  # a run that was stopped and goes on asks the rest of its round
         row.round += 1
     for number, asked in enumerate(questions, start=1):
-        demonstration = shown[asked.demonstration]
-        tool = values.tool(session, found(session, Segmentation, demonstration.segmentation_id, "segmentation"))
-        names, descriptions = [r.name for r in tool.regions], [r.description for r in tool.regions]
-        query = known.get(asked.fingerprint)
-        if query is None:
-            query = Query(
-                run_id=row.id,
-                project_id=row.project_id,
-                tool_id=demonstration.tool_id,
-                demonstration_id=demonstration.id,
-                kind="similarity" if row.kind == "performance" else "preference",
-                round=row.round,
-                checkpoint=row.checkpoint,
-                number=number,
-                left=list(asked.left),
-                right=list(asked.right),
-                why=asked.why,
-                difference=describe_difference(names, descriptions, asked.left, asked.right),
-                differs=list(asked.differs),
-                fingerprint=asked.fingerprint,
-            )
+        query = known.get(asked.fingerprint) or _new_query(values, session, row, shown, asked, number)
         if not again:
             query.round, query.number = row.round, number
         query.state, query.checkpoint = "open", row.checkpoint
         session.add(query)
         session.flush()
         emit(session, "query.changed", row.project_id, query_id=query.id, run_id=row.id)
+
+
+def _new_query(values: Values, session: Session, row: Run, shown: list[Demonstration], asked: Asked, number: int) -> Query:
+    """The question as a row, with the difference in words."""
+    demonstration = None if asked.demonstration is None else shown[asked.demonstration]
+    key = row.interest[asked.tool or 0] if demonstration is None else demonstration.segmentation_id
+    cut = found(session, Segmentation, key, "segmentation")
+    tool = values.tool(session, cut)
+    names, descriptions = [r.name for r in tool.regions], [r.description for r in tool.regions]
+    kind = "pair" if demonstration is None else "similarity" if row.kind == "performance" else "preference"
+    words = describe_difference(names, descriptions, asked.left, asked.right, *([PAIR] if kind == "pair" else []))
+    return Query(
+        run_id=row.id,
+        project_id=row.project_id,
+        tool_id=cut.tool_id,
+        demonstration_id=None if demonstration is None else demonstration.id,
+        kind=kind,
+        round=row.round,
+        checkpoint=row.checkpoint,
+        number=number,
+        left=list(asked.left),
+        right=list(asked.right),
+        why=asked.why,
+        difference=words,
+        differs=list(asked.differs),
+        fingerprint=asked.fingerprint,
+    )
+
+
+def _named(session: Session, row: Run, report: Json) -> Json:
+    """A certificate with the tools it speaks of: demonstrated ones beside their slack, the others with their chances."""
+    shown = demonstrations_of(session, row.id)
+    cuts = [found(session, Segmentation, key, "segmentation") for key in row.interest]
+
+    def name(tool_id: str) -> Json:
+        return {"tool_id": tool_id, "tool_name": found(session, ToolRow, tool_id, "tool").name}
+
+    ties = report["class_sizes"] or [None] * len(shown)
+    demonstrated = [
+        {**name(d.tool_id), "slack": slack, "ties": size}
+        for d, slack, size in zip(shown, report["slack"] or [0.0] * len(shown), ties, strict=True)
+    ]
+    tools = [{**name(cuts[t["tool"]].tool_id), **{k: v for k, v in t.items() if k != "tool"}} for t in report["tools"]]
+    left_out = {"slack", "class_sizes", "identifiable"}
+    return {**{k: v for k, v in report.items() if k not in left_out}, "demonstrations": demonstrated, "tools": tools}
 
 
 def _close(session: Session, row: Run, out: Outcome) -> None:

@@ -160,7 +160,7 @@ def test_sequences_must_hold_every_region_once(client: TestClient, api: Api, pro
 def waiting_run(api: Api) -> tuple[dict, list[dict]]:
     """A performance run of the sample project that asks something."""
     project = api.post("/projects/sample")["id"]
-    run = api.post(f"/projects/{project}/runs", {"kind": "performance", "seed": 7}, status=202)
+    run = api.post(f"/projects/{project}/runs", {"kind": "performance", "mode": "paper", "seed": 7}, status=202)
     run = api.until(f"/runs/{run['id']}", lambda row: row["state"] not in ("queued", "training"))
     assert run["state"] == "waiting_for_expert", run
     return run, api.get(f"/runs/{run['id']}/queries", params={"state": "open"})["items"]

@@ -96,9 +96,9 @@ def test_interactions_change_coverage(client: TestClient, api: Api, sample: dict
 def test_teaching_to_the_robot(api: Api, sample: dict[str, Any]) -> None:
     """Performance run, effort run, plan for an undemonstrated tool, playback of the arm on it."""
     project = sample["id"]
-    defaults = api.get(f"/projects/{project}/run-defaults", params={"kind": "performance"})["parameters"]
+    defaults = api.get(f"/projects/{project}/run-defaults", params={"kind": "performance", "mode": "paper"})["parameters"]
     assert all(p["symbol"] and p["label"] for p in defaults)
-    run = api.post(f"/projects/{project}/runs", {"kind": "performance", "seed": 3}, status=202)
+    run = api.post(f"/projects/{project}/runs", {"kind": "performance", "mode": "paper", "seed": 3}, status=202)
     run = teach(api, run, "not_similar")
     run = api.until(f"/runs/{run['id']}", lambda row: row["policy_id"] is not None)
     metrics = api.get(f"/runs/{run['id']}/metrics")["items"]
@@ -135,7 +135,7 @@ def test_teaching_to_the_robot(api: Api, sample: dict[str, Any]) -> None:
 
 
 def test_undo_of_an_answer_asks_again(api: Api, sample: dict[str, Any]) -> None:
-    run = api.post(f"/projects/{sample['id']}/runs", {"kind": "performance", "seed": 7}, status=202)
+    run = api.post(f"/projects/{sample['id']}/runs", {"kind": "performance", "mode": "paper", "seed": 7}, status=202)
     run = api.until(f"/runs/{run['id']}", lambda row: row["state"] in SETTLED)
     queries = api.get(f"/projects/{sample['id']}/queries", params={"state": "open"})["items"]
     assert len(queries) == run["open_queries"] >= 1

@@ -14,7 +14,7 @@ def settled(api: Api, run: dict[str, Any]) -> dict[str, Any]:
 
 def start(api: Api) -> dict[str, Any]:
     project = api.post("/projects/sample")["id"]
-    return api.post(f"/projects/{project}/runs", {"kind": "performance", "seed": SEED}, status=202)
+    return api.post(f"/projects/{project}/runs", {"kind": "performance", "mode": "paper", "seed": SEED}, status=202)
 
 
 def questions(api: Api, run: dict[str, Any]) -> list[dict[str, Any]]:
@@ -34,7 +34,7 @@ def finish(api: Api, run: dict[str, Any], log: list[Any]) -> list[float]:
             api.post(f"/runs/{run['id']}/finish", status=202)
             run = api.until(f"/runs/{run['id']}", lambda row: row["policy_id"] is not None)
         if run["state"] != "waiting_for_expert":
-            assert run["policy_id"] is not None, run
+            assert run["policy_id"] is not None, (run["state"], run["message"], run["error"])
             return [weight["value"] for weight in api.get(f"/policies/{run['policy_id']}")["weights"]]
         for query in questions(api, run):
             log.append((query["tool_name"], query["left"]["sequence"], query["right"]["sequence"]))

@@ -1,4 +1,7 @@
-"""Runs that wait for a person: stopped between question and answer, answered twice, taken back, pulled from under."""
+"""Runs that wait for a person, in the paper's mode: stopped, answered twice, taken back, pulled from under.
+
+The other mode is in `test_certified_runs`.
+"""
 
 import threading
 from collections.abc import Callable
@@ -36,7 +39,7 @@ def open_questions(ctx: Context, run: Json) -> list[Json]:
 
 
 def waiting(ctx: Context, kind: str = "performance") -> Json:
-    run = settle(ctx, runs.start_run(ctx, project_of(ctx)["id"], kind, {}, SEED))
+    run = settle(ctx, runs.start_run(ctx, project_of(ctx)["id"], kind, {}, SEED, "paper"))
     assert run["state"] == "waiting_for_expert", run
     return run
 
@@ -103,7 +106,7 @@ def test_a_step_that_was_cut_off_gives_the_same_weights(sample_settings: Setting
     """As after SIGKILL in the middle of a step: the job row says running, nothing of the step is stored."""
     ctx = open_context(sample_settings)
     ctx.jobs.close()  # nobody works
-    run = runs.start_run(ctx, project_of(ctx)["id"], "performance", {}, SEED)
+    run = runs.start_run(ctx, project_of(ctx)["id"], "performance", {}, SEED, "paper")
 
     def cut_off(session: Any) -> None:
         row = session.exec(select(JobRow).where(JobRow.subject_id == run["id"])).one()
@@ -302,7 +305,7 @@ def test_effort_needs_a_policy_and_adds_to_it(sample: Context) -> None:
 )
 def test_wrong_parameters_are_refused_in_words(sample: Context, params: Json, words: str) -> None:
     with pytest.raises(InvalidInput, match=words):
-        runs.start_run(sample, project_of(sample)["id"], "performance", params)
+        runs.start_run(sample, project_of(sample)["id"], "performance", params, mode="paper")
     assert runs.list_runs(sample, project_of(sample)["id"]) == []
 
 

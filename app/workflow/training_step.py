@@ -1,0 +1,149 @@
+"""One step of a learner, away from the database: what it needs, what it gives, and how it is computed."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from app.jobs.worker import Report
+from app.learning.certified_run import Memory, certified_step, start_certified
+from app.learning.certified_state import CertifiedParameters, CertifiedState
+from app.learning.effort import EffortParameters, EffortState, effort_step, start_effort
+from app.learning.performance import (
+    LearningDemonstration,
+    PerformanceParameters,
+    PerformanceState,
+    performance_step,
+    start_performance,
+)
+from app.learning.performance_conflict import Contradiction
+from app.learning.performance_state import Metric
+from app.learning.qp import Array
+from app.sequencing.problem import SequencingProblem
+from app.workflow.values import Kept
+
+Json = dict[str, Any]
+MetricRow = tuple[int, float, dict[str, float], int]
+
+CHUNK = 25  # iterations per job: a few seconds at most between two checkpoints
+_problems = Kept(48)  # of a worker process: their tables are costly to build
+_memories = Kept(4)  # of a worker process: what earlier steps of a certified run found; losing it costs only time
+
+
+@dataclass(frozen=True)
+class Step:
+    """Everything a step needs."""
+
+    run_id: str
+    kind: str
+    keys: tuple[tuple[Any, ...], ...]  # of the problems, to recognise them
+    demonstrations: tuple[LearningDemonstration, ...]
+    parameters: PerformanceParameters | CertifiedParameters | EffortParameters
+    seed: int
+    state: Json | None  # None: start
+    answers: dict[str, str]
+    base: tuple[float, ...]  # effort: the performance weights
+    tools: tuple[SequencingProblem, ...] = ()  # certified: tools of interest
+    tool_keys: tuple[tuple[Any, ...], ...] = ()
+    gone: frozenset[int] = frozenset()  # of them, those that were deleted or cut anew since
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A question of any kind."""
+
+    demonstration: int | None  # index of the run's demonstrations
+    left: tuple[int, ...]
+    right: tuple[int, ...]
+    why: str
+    differs: tuple[int, ...]
+    fingerprint: str
+    tool: int | None = None  # certified: index of the run's tools of interest
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a step gave."""
+
+    state: Json
+    outcome: str
+    iteration: int
+    metrics: tuple[MetricRow, ...]
+    questions: tuple[Asked, ...]
+    weights: tuple[float, ...]
+    identifiable: tuple[bool, ...]
+    message: str
+    contradiction: Contradiction | None = None
+    report: Json | None = None  # certified: with indices for tools and demonstrations
+
+
+def compute(step: Step, report: Report) -> Outcome:
+    """One step of the learner; pure."""
+    report(0.05, "Comparing orders")
+    known = [LearningDemonstration(_known(key, d.problem), d.sequence) for key, d in zip(step.keys, step.demonstrations, strict=True)]
+    if isinstance(step.parameters, CertifiedParameters):
+        return _certified(step, step.parameters, known)
+    if isinstance(step.parameters, EffortParameters):
+        return _effort(step, step.parameters, known)
+    return _performance(step, step.parameters, known)
+
+
+def _known(key: tuple[Any, ...], problem: SequencingProblem) -> SequencingProblem:
+    return _problems.get(key, lambda: problem)
+
+
+def _certified(step: Step, parameters: CertifiedParameters, demonstrations: list[LearningDemonstration]) -> Outcome:
+    tools = [_known(key, tool) for key, tool in zip(step.tool_keys, step.tools, strict=True)]
+    state = CertifiedState.from_json(step.state) if step.state else start_certified(demonstrations, tools, parameters, step.seed)
+    memory: Memory = _memories.get((step.run_id, step.seed, parameters), Memory.empty)
+    result = certified_step(demonstrations, tools, parameters, state, step.answers, memory, step.gone)
+    return Outcome(
+        state=result.state.to_json(),
+        outcome=result.outcome,
+        iteration=result.state.steps,
+        metrics=tuple(_row(m) for m in result.metrics),
+        questions=tuple(Asked(None, q.left, q.right, q.why, q.differs, q.fingerprint, q.tool) for q in result.questions),
+        weights=_floats(result.weights),
+        identifiable=result.report.identifiable,
+        message=result.message,
+        contradiction=result.contradiction,
+        report=result.report.to_json(),
+    )
+
+
+def _performance(step: Step, parameters: PerformanceParameters, demonstrations: list[LearningDemonstration]) -> Outcome:
+    state = PerformanceState.from_json(step.state) if step.state else start_performance(demonstrations, parameters, step.seed)
+    result = performance_step(demonstrations, parameters, state, step.answers, CHUNK)
+    return Outcome(
+        state=result.state.to_json(),
+        outcome=result.outcome,
+        iteration=result.state.iteration,
+        metrics=tuple(_row(m) for m in result.metrics),
+        questions=tuple(
+            Asked(q.demonstration, demonstrations[q.demonstration].sequence, q.candidate, q.why, q.differs, q.fingerprint)
+            for q in result.questions
+        ),
+        weights=_floats(result.weights),
+        identifiable=tuple(bool(x) for x in result.state.identifiable),
+        message=result.message,
+        contradiction=result.contradiction,
+    )
+
+
+def _effort(step: Step, parameters: EffortParameters, demonstrations: list[LearningDemonstration]) -> Outcome:
+    if step.state:
+        state = EffortState.from_json(step.state)
+    else:
+        state = start_effort(demonstrations, np.array(step.base), parameters, step.seed)
+    result = effort_step(demonstrations, parameters, state, step.answers)
+    asked = tuple(Asked(q.demonstration, q.left, q.right, q.why, q.differs, q.fingerprint) for q in result.questions)
+    weights = _floats(result.effort_weights)
+    return Outcome(result.state.to_json(), result.outcome, 0, (), asked, weights, tuple(True for _ in weights), result.message)
+
+
+def _row(m: Metric) -> MetricRow:
+    return m.iteration, float(m.loss), {k: float(v) for k, v in m.terms.items()}, int(m.violations)
+
+
+def _floats(values: Array) -> tuple[float, ...]:
+    return tuple(float(x) for x in values)
