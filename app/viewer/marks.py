@@ -14,7 +14,7 @@ from app.viewer.borders import rim, size
 from app.viewer.palette import rgb, theme
 from app.viewer.stage import CASING_WIDTH, LIFT, OUTLINE_WIDTH
 
-POINT = 0.006  # radius of a clicked point / diagonal of the part
+POINT = 0.009  # radius of a clicked point / diagonal of the part
 
 
 @dataclass(frozen=True)

@@ -64,6 +64,7 @@ class Stage:
         self._letters: list[viser.LabelHandle] = []
         self._rims: tuple[Array, ...] = ()
         self._outlines: list[viser.LineSegmentsHandle] = []
+        self._borders: viser.LineSegmentsHandle | None = None
 
     def build(self, tool: Tool | None, dark: bool, ground: float | None = None) -> None:
         """Replace whatever is shown by the tool, not painted yet. Beside a robot it stands on a block on the ground (metres)."""
@@ -86,6 +87,9 @@ class Stage:
             for region, (old, new) in enumerate(zip(before, picture.regions, strict=True)):
                 if old != new:
                     self._paint_region(region, new)
+            if before and [look is None or look.visible for look in before] != [look.visible for look in picture.regions]:
+                seen = [rim for rim, look in zip(self._rims, picture.regions, strict=True) if look.visible]
+                self._draw_borders(np.concatenate(seen) if seen else np.empty((0, 2, 3)), theme(picture.dark))
             if self.shown is None or _outlines(self.shown) != _outlines(picture):
                 self._draw_outlines(picture)
         self.shown = picture
@@ -128,7 +132,7 @@ class Stage:
         )  # fmt: skip
 
     def _add_part(self, tool: Tool, colours: Theme) -> None:
-        scene, span = self.server.scene, size(tool)
+        span = size(tool)
         rest = tool.mesh.faces[tool.labels < 0]
         if len(rest):
             body = self._add_mesh("/tool/body", *part_of(tool.mesh, rest), rgb(colours.body), flat_shading=True)
@@ -138,10 +142,17 @@ class Stage:
             mesh = self._add_mesh(f"/tool/r{region:03d}", vertices, faces, rgb(colours.body))
             self._listen(mesh, region)
             self._regions.append(mesh)
-        borders = all_borders(tool, LIFT * span)
-        if len(borders):
-            scene.add_line_segments("/tool/borders", borders, rgb(colours.edge), thickness=EDGE_WIDTH, thickness_units="screen")
         self._rims = region_rims(tool, LIFT * span)
+        self._draw_borders(all_borders(tool, LIFT * span), colours)
+
+    def _draw_borders(self, borders: Array, colours: Theme) -> None:
+        if self._borders is not None:
+            self._borders.remove()
+            self._borders = None
+        if len(borders):
+            self._borders = self.server.scene.add_line_segments(
+                "/tool/borders", borders, rgb(colours.edge), thickness=EDGE_WIDTH, thickness_units="screen"
+            )
 
     def _add_mesh(self, name: str, vertices: np.ndarray, faces: np.ndarray, colour: Rgb, flat_shading: bool = False) -> viser.MeshHandle:
         return self.server.scene.add_mesh_simple(

@@ -297,7 +297,8 @@ class View:
             return draft_progress(self._actions.get_draft(scene["tool_id"])["sequence"], highlight)
         if mode == "edit":
             locked, hidden = self._marked
-            return Progress(selected=frozenset(scene["selection"]), hover=self._hover, locked=locked, hidden=hidden)
+            selected = scene["selection"] if scene["pointing"] == "select" else ()  # else the points and lines are what matters
+            return Progress(selected=frozenset(selected), hover=self._hover, locked=locked, hidden=hidden)
         if mode == "robot" and self._playback is not None:
             return progress_at(self._playback, now)
         if mode in ("sequence", "robot"):
