@@ -25,15 +25,15 @@ NUMBERS = (
 WORDS = (b"", b"\0", b"\r", b"\n\n", b'"', b"<!ENTITY a 'b'>", b";", b",", b"#", b"\xc3\x28", b"9" * 400)
 
 
-def mutated(kind: str, content: bytes, random: np.random.Generator) -> bytes:
-    """One to four random injuries; of a 3MF mostly to the model inside it."""
+def mutated(kind: str, content: bytes, random: np.random.Generator, most: int = 4) -> bytes:
+    """One to `most` random injuries; of a 3MF mostly to the model inside it."""
     if kind == "3mf" and random.random() < 0.7:
-        return threemf(_injured(model_of(content), random))
-    return _injured(content, random)
+        return threemf(_injured(model_of(content), random, most))
+    return _injured(content, random, most)
 
 
-def _injured(data: bytes, random: np.random.Generator) -> bytes:
-    for _ in range(int(random.integers(1, 5))):
+def _injured(data: bytes, random: np.random.Generator, most: int) -> bytes:
+    for _ in range(int(random.integers(1, most + 1))):
         injury = INJURIES[int(random.integers(len(INJURIES)))]
         data = injury(data, random) if data else data
     return data
