@@ -22,6 +22,7 @@ class Actions:
     tool_value: Callable[[str], Tool]
     playback_value: Callable[[str], Playback]
     tool_state: Callable[[str], Json]
+    get_ready: Callable[[str], None]
     piece_faces: Callable[[str], Any]
     pick: Callable[..., Any]
     select: Callable[[str, list[int]], Any]
@@ -37,6 +38,7 @@ def workflow_actions(ctx: Context) -> Actions:
         tool_value=partial(tools.tool_value, ctx),
         playback_value=partial(robot.playback_value, ctx),
         tool_state=lambda tool_id: tools.get_tool(ctx, tool_id)["edit"],
+        get_ready=partial(editing_views.get_ready, ctx),
         piece_faces=partial(editing_views.piece_faces, ctx),
         pick=partial(sessions.pick_in_view, ctx),
         select=partial(editing_views.add_regions, ctx),

@@ -113,6 +113,7 @@ class View:
         self._playback_shown: str | None = None
         self._arm: Arm | None = None
         self._hover: int | None = None
+        self._ready_for: str | None = None  # tool prepared for edits
         self._marked: tuple[frozenset[int], frozenset[int]] = (frozenset(), frozenset())  # locked, hidden
         self._clock = Clock()
         self.server = open_server()
@@ -258,6 +259,7 @@ class View:
         self._playback_shown = playback_id
         self._pointer.listen(mode == "edit")
         if mode == "edit":
+            self._get_ready(self._scene["tool_id"])
             state = self._actions.tool_state(self._scene["tool_id"])
             self._marked = frozenset(state["locked"]), frozenset(state["hidden"])
         else:
@@ -265,6 +267,19 @@ class View:
         if tool is not None:
             piece = self._actions.piece_faces(self.sid) if mode == "edit" and self._scene.get("points") else None
             self._marks.draw(tool, marks_of(tool, self._scene, piece) if mode == "edit" else NOTHING, dark)
+
+    def _get_ready(self, tool_id: str) -> None:
+        """Have the tool prepared for edits beside this view's queue, once."""
+        if tool_id == self._ready_for:
+            return
+        self._ready_for = tool_id
+
+        def prepare() -> None:
+            with contextlib.suppress(AppError):  # deleted meanwhile, or not read in: then there is nothing to edit
+                self._actions.get_ready(tool_id)
+
+        with contextlib.suppress(RuntimeError):  # the loop has ended
+            self._loop.call_soon_threadsafe(self._loop.run_in_executor, None, prepare)
 
     def _recording(self, playback_id: str) -> Playback | None:
         """The robot's recording; None while it is still being computed, which its page tells."""

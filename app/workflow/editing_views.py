@@ -7,6 +7,7 @@ from sqlmodel import Session, select
 
 from app.errors import AppError, InvalidInput
 from app.geometry.pieces import Piece, piece_under
+from app.geometry.regions import warm_up
 from app.geometry.slicing import nearest_face
 from app.geometry.tool import Tool
 from app.storage import emit
@@ -124,6 +125,20 @@ def piece_faces(ctx: Context, session_id: str) -> np.ndarray | None:
         return None if known is None else known[1].faces
 
     return ctx.store.read(query)
+
+
+def get_ready(ctx: Context, tool_id: str) -> None:
+    """Do now what the first edit of a tool would wait for: its merge tree, and the kernels that measure regions."""
+
+    def query(session: Session) -> tuple[Tool, tuple[str, str | None, str | None]]:
+        row = present(session, ToolRow, tool_id)
+        cut = ready_segmentation(session, row)
+        return ctx.values.tool(session, cut), (cut.tool_sha, row.part_sha, row.tree_sha)
+
+    tool, names = ctx.store.read(query)
+    if tool.graph.source == "mesh":
+        warm_up()
+        ctx.values.tree(tool, *names)
 
 
 def follow_edit(values: Values, session: Session, row: ToolRow, after: After) -> None:

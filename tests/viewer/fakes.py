@@ -52,6 +52,7 @@ class FakeWorkflow:
     running: dict[str, Any] = field(default_factory=lambda: {"playing": False, "time": 0.0, "speed": 1.0, "duration": None})
     picked: list[tuple[str, int]] = field(default_factory=list)
     state: dict[str, Any] = field(default_factory=lambda: {"locked": [], "hidden": []})
+    ready: list[str] = field(default_factory=list)
     points: list[Any] = field(default_factory=list)
     listeners: list[Callable[[Event], None]] = field(default_factory=list)
 
@@ -105,6 +106,7 @@ class FakeWorkflow:
             tool_value=lambda _tool: self.tool,
             playback_value=self.recording,
             tool_state=lambda _tool: self.state,
+            get_ready=self.ready.append,
             piece_faces=lambda _sid: None,
             pick=self.pick,
             select=self.select,

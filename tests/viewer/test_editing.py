@@ -131,6 +131,7 @@ def test_clicks_boxes_and_the_pointer_reach_the_workflow(served: Served, workflo
                 nothing = (await browser.post(f"{served.base}/v/s1/under", json={"x": None, "y": None})).json()
                 assert nothing == {"region": None, "on_body": False, "point_mm": None}
                 assert (await browser.post(f"{served.base}/v/s1/under", json={"x": 7, "y": 0})).status_code == 422
+            assert workflow.ready == ["t1"], "prepared once, before the first edit"
             workflow.state["hidden"] = [5]
             workflow.tell("tool.changed", tool_id="t1")
             await eventually(lambda: view.stage.shown is not None and not view.stage.shown.regions[5].visible)
