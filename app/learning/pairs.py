@@ -15,6 +15,7 @@ from app.learning.qp import Array
 from app.learning.questions import Sequence, appearance, differing_regions, fingerprint
 
 CURIOSITY = 0.1  # worth of a nat of information beside a tool put right
+TRIED = 3  # pairs per tool looked at when an answer tells a tool's class: which pair is shown then hardly matters
 SHOWING = 1.0  # cost of showing an order oneself, in answers: both were wrong
 TIE = 1e-12
 
@@ -55,13 +56,15 @@ def offers(outlooks: Outlooks, asked: Mapping[int, set[tuple[int, ...]]], endors
     found = []
     for tool, mine in outlooks.items():
         best: Offer | None = None
+        tried = 0
         for first, second in _candidates(mine):
             if look(mine, first, second) in asked.get(tool, set()):
                 continue
             worth = _worth_of_choice(outlooks, mine, first, second) if endorse else _worth_of_comparison(outlooks, mine, first, second)
             if best is None or worth > best.worth + TIE:
                 best = Offer(worth, tool, first, second)
-            if endorse:
+            tried += 1
+            if endorse and tried == TRIED:
                 break
         if best is not None:
             found.append(best)
@@ -89,7 +92,7 @@ def risk(outlooks: Outlooks, share: Array) -> float:
 
 
 def _candidates(mine: Outlook) -> list[tuple[int, int]]:
-    """Pairs of classes, the most telling first: the choice against what those want who can't live with it."""
+    """Pairs of classes, the most telling first: the two that most samples want, then the choice against what its opponents want."""
     count = len(mine.orders)
     votes = np.bincount(mine.favourite, minlength=count)
     against = ~mine.close[mine.chosen]
@@ -97,9 +100,10 @@ def _candidates(mine: Outlook) -> list[tuple[int, int]]:
         return []
     wanted = np.bincount(mine.favourite[against], minlength=count)
     others = [int(c) for c in np.argsort(-wanted, kind="stable") if wanted[c]]
-    pairs = [(mine.chosen, c) for c in others]
     ranked = [int(c) for c in np.argsort(-votes, kind="stable") if votes[c]]
-    return pairs + [(a, b) for k, a in enumerate(ranked) for b in ranked[k + 1 :] if mine.chosen not in (a, b)]
+    pairs = [tuple(ranked[:2])] if len(ranked) > 1 else []
+    pairs += [(mine.chosen, c) for c in others] + [(a, b) for k, a in enumerate(ranked) for b in ranked[k + 1 :]]
+    return list(dict.fromkeys((min(a, b), max(a, b)) for a, b in pairs if a != b))
 
 
 def _worth_of_choice(outlooks: Outlooks, mine: Outlook, first: int, second: int) -> float:

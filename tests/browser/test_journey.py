@@ -46,4 +46,4 @@ def test_answer_a_question_by_key(studio: Studio) -> None:
     studio.page.locator(".view3d iframe.shown").first.wait_for()
     studio.page.keyboard.press("2")
     answered = studio.api.until(f"/queries/{before[0]['id']}", lambda query: query["state"] == "answered")
-    assert answered["answer"]["value"] == "not_similar"
+    assert (answered["kind"], answered["answer"]["value"]) == ("pair", "right")

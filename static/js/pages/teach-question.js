@@ -38,7 +38,7 @@ export class QuestionView {
   }
 
   bindKeys() {
-    bind({ key: (key) => this.active && this.query.choices.some((choice) => choice.key === key), shown: "1 2 3 0", name: "Answer the question", when: () => this.active, run: (event) => this.answer(this.query.choices.find((choice) => choice.key === event.key)) });
+    bind({ key: (key) => this.active && this.query.choices.some((choice) => choice.key === key), shown: "1 2 3 4 0", name: "Answer the question", when: () => this.active, run: (event) => this.answer(this.query.choices.find((choice) => choice.key === event.key)) });
     bind({ key: "u", name: "Undo the last answer", when: () => this.canUndo(), run: () => this.onUndo() });
     bind({ key: "z", ctrl: true, shift: false, name: "Undo the last answer", when: () => this.canUndo(), run: () => this.onUndo() });
     bind({ key: "v", name: "Show the other order (narrow window)", when: () => this.active && !this.wide.matches, run: () => this.choose(this.chosen === "left" ? "right" : "left") });
@@ -104,7 +104,7 @@ export class QuestionView {
     fill(this.top, h("div.question", { "aria-live": "polite" }, h("h1#question-title", {}, query.title), h("p.muted", {}, query.difference)),
       h("div.count", {}, h("span.num", {}, `Question ${query.number}${more ? `, ${more} more` : ", the last for now"}`), ticks));
     this.answers.style.setProperty("--columns", ["1fr", "1fr", ...query.choices.slice(2).map(() => "auto")].join(" "));
-    fill(this.answers, query.choices.map((choice) => h(`button.answer${choice.key === "0" || choice.value === "equal" ? ".quiet" : ""}`, { type: "button", dataset: { key: `answer-${choice.value}`, value: choice.value }, onclick: () => this.answer(choice) },
+    fill(this.answers, query.choices.map((choice) => h(`button.answer${["cant_tell", "equal", "both_wrong"].includes(choice.value) ? ".quiet" : ""}`, { type: "button", dataset: { key: `answer-${choice.value}`, value: choice.value }, onclick: () => this.answer(choice) },
       h("kbd", {}, choice.key), h("span", {}, h("b", {}, choice.label), choice.hint ? h("small", {}, choice.hint) : null))));
     fill(this.below, query.why ? h("p.why", {}, h("b", {}, "Why this one"), query.why) : null, h("span.push"),
       h("button.btn.quiet.small", { type: "button", disabled: !this.canUndo(), dataset: { key: "undo-answer", tip: "Undo last answer (U)" }, onclick: () => this.onUndo() }, icon("undo"), "Undo last answer"));

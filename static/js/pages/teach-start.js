@@ -2,7 +2,7 @@
 // says how the last run ended.
 
 import { get, post } from "../api.js";
-import { h } from "../dom.js";
+import { fill, h } from "../dom.js";
 import { icon } from "../icons.js";
 import { pageAddress } from "../shell.js";
 import { complain } from "../toasts.js";
@@ -13,8 +13,20 @@ function parameterField(entry) {
   return h("label", {}, h("span", {}, h("span.symbol", { dataset: { tip: `${entry.symbol} in the paper, usually ${number(entry.default)}` } }, entry.label)), field);
 }
 
-async function parameterDrawer(projectId, kind) {
-  const { parameters } = await get(`/projects/${encodeURIComponent(projectId)}/run-defaults?kind=${kind}`);
+const MODES = { certified: "With proof: every recorded order the best one, questions about tools you have not shown", paper: "As printed in the paper: step by step, questions about the tools you have shown" };
+
+// A performance run has two ways to learn, each with its own parameters.
+async function modeDrawer(projectId) {
+  const drawers = Object.fromEntries(await Promise.all(Object.keys(MODES).map(async (mode) => [mode, await parameterDrawer(projectId, "performance", mode)])));
+  const choice = h("select.field", { name: "mode", "aria-label": "How it learns", style: { width: "100%" }, onchange: () => show() }, Object.entries(MODES).map(([value, words]) => h("option", { value }, words)));
+  const place = h("div", { style: { width: "100%" } });
+  const show = () => fill(place, drawers[choice.value].node);
+  show();
+  return { node: h("div", { style: { width: "100%" } }, h("label.stack", { style: { gap: "var(--s-1)" } }, h("span.small.muted", {}, "How it learns"), choice), place), mode: () => choice.value, values: () => drawers[choice.value].values(), seed: () => drawers[choice.value].seed() };
+}
+
+async function parameterDrawer(projectId, kind, mode = "certified") {
+  const { parameters } = await get(`/projects/${encodeURIComponent(projectId)}/run-defaults?kind=${kind}&mode=${mode}`);
   const seed = h("label", {}, h("span.symbol", { dataset: { tip: "The same seed and the same answers give the same policy" } }, "Seed of the random draws"), h("input.field", { type: "number", step: "1", min: "0", name: "seed", placeholder: "any" }));
   const node = h("details.drawer", { style: { width: "100%" } }, h("summary", { style: { padding: "0" } }, icon("right", "caret"), h("h2", {}, "Parameters"), h("span", {}, "usual values")), h("div.params", { style: { padding: "0" } }, parameters.map(parameterField), seed));
   const words = node.querySelector("summary > span");
@@ -41,7 +53,7 @@ function startButton(projectId, kind, drawer, primary, words, reason, onStarted)
     fault.textContent = "";
     try {
       const seed = drawer.seed();
-      onStarted(await post(`/projects/${encodeURIComponent(projectId)}/runs`, { kind, params: drawer.values(), ...(seed === null ? {} : { seed }) }));
+      onStarted(await post(`/projects/${encodeURIComponent(projectId)}/runs`, { kind, ...(drawer.mode ? { mode: drawer.mode() } : {}), params: drawer.values(), ...(seed === null ? {} : { seed }) }));
     } catch (error) {
       fault.textContent = error.message;
     }
@@ -53,13 +65,13 @@ function startButton(projectId, kind, drawer, primary, words, reason, onStarted)
 // The two cards. `learned`: a performance policy exists.
 export async function startCards({ project, runs, onStarted }) {
   const learned = runs.some((run) => run.kind === "performance" && run.state === "converged");
-  const [performance, effort] = await Promise.all([parameterDrawer(project.id, "performance"), parameterDrawer(project.id, "effort")]);
+  const [performance, effort] = await Promise.all([modeDrawer(project.id), parameterDrawer(project.id, "effort")]);
   const count = project.counts.demonstrations;
   const empty = count === 0 ? "Record at least one demonstration first" : null;
   const before = learned ? null : "Learn what makes an order good first: this decides between orders that are equally good";
   return h("div.kinds", {},
     h("section.card.kind", {}, h("h2", {}, "What makes an order good"),
-      h("p", {}, count ? `Learns from ${plural(count, "demonstration")} what an order should cost, and asks you whether other orders would be just as good.` : "Learns from your demonstrations. There is none yet."),
+      h("p", {}, count ? `Learns from ${plural(count, "demonstration")} what an order should cost, and asks you about tools that can still go more than one way.` : "Learns from your demonstrations. There is none yet."),
       startButton(project.id, "performance", performance, !learned, learned ? "Learn again" : "Start learning", empty, onStarted),
       count ? performance.node : h("a.btn", { href: pageAddress(project.id, "record") }, "Record a demonstration")),
     h("section.card.kind", {}, h("h2", {}, "Which good order is less effort"),
@@ -96,10 +108,24 @@ function outcomeActions(run, project, act, tools) {
   return [];
 }
 
+const percent = (share) => `${Math.round(100 * share)} %`;
+
+// How sure the choice is on each tool nobody has recorded, and on which demonstrations the weights fall short.
+function chances(report, project) {
+  if (!report) return null;
+  const odd = report.demonstrations.filter((entry) => entry.slack > 1e-7);
+  const row = (tool) => h("tr", {}, h("td", {}, tool.tool_name), h("td.num", { dataset: { tip: "Share of the weights that agree with all you said under which the chosen order is among the cheapest" } }, percent(tool.probability)),
+    h("td.num", { dataset: { tip: "How much more the chosen order could cost than the best one, under any of these weights" } }, tool.extra < 1e-7 ? "nothing" : `${number(100 * tool.extra, 2)} %`),
+    h("td", {}, tool.agreed ? "settled" : h("a", { href: pageAddress(project.id, "record", { tool: tool.tool_id }) }, "record it")));
+  return [odd.length ? h("p", {}, "Under the weights found: ", odd.map((entry, i) => [i ? ", " : "", h("a", { href: pageAddress(project.id, "record", { tool: entry.tool_id }) }, entry.tool_name), ` costs ${number(100 * entry.slack, 2)} % more than its cheapest order`]), ".") : null,
+    report.tools.length ? h("details.drawer", { open: true, style: { width: "100%" } }, h("summary", { style: { padding: "0" } }, icon("right", "caret"), h("h2", {}, "Tools nobody has recorded"), h("span", {}, `expect ${number(report.expected_wrong, 2)} of ${report.tools.length} wrong`)),
+      h("table.run-list", {}, h("thead", {}, h("tr", {}, h("th", {}, "Tool"), h("th.num", {}, "Order is right"), h("th.num", {}, "At worst dearer by"), h("th", {}, ""))), h("tbody", {}, report.tools.map(row)))) : null];
+}
+
 export function outcomeCard({ run, project, act, tools = [] }) {
   const outcome = OUTCOMES[run.state]?.(run);
   if (!outcome) return null;
   const details = [run.message, typeof run.error === "string" ? run.error : run.error?.detail].filter(Boolean);
   return h("section.card.outcome", { "aria-label": "How it ended" }, h(`span.chip${outcome.tone ? `.${outcome.tone}` : ""}`, {}, icon(outcome.mark), `${run.kind === "performance" ? "Learning" : "Preferences"}, ${ago(run.updated_at)}`),
-    h("h2", {}, outcome.title), h("p", {}, outcome.text), [...new Set(details)].map((text) => h("p", {}, text)), h("div.actions", {}, outcomeActions(run, project, act, tools)));
+    h("h2", {}, outcome.title), h("p", {}, outcome.text), [...new Set(details)].map((text) => h("p", {}, text)), chances(run.report, project), h("div.actions", {}, outcomeActions(run, project, act, tools)));
 }

@@ -13,6 +13,12 @@ const TERMS = [
   { key: "regularisation", name: "small weights", colour: "var(--c-3)", symbol: "lambda: keeps the weights small" },
 ];
 
+const OPEN_TERMS = [
+  { key: "open", name: "tools expected wrong", colour: "var(--c-1)", symbol: "sum over the tools nobody has recorded of the probability that the chosen order is not the best" },
+  { key: "slack", name: "slack", colour: "var(--c-2)", symbol: "how much the recorded orders cost above the cheapest, relative" },
+];
+const termsOf = (run) => (run?.mode === "certified" ? OPEN_TERMS : TERMS);
+
 const KEY_FACTS = 4;
 
 export const explained = (violations) => (violations === 0 ? "every demonstration explained" : `${plural(violations, "demonstration")} not yet explained`);
@@ -27,8 +33,9 @@ export class Training {
     this.facts = h("span.facts");
     this.state = h("span.push");
     this.parameters = h("dl.stack", { style: { gap: "var(--s-2)" } });
+    this.legend = h("div.legend");
     this.stop = h("button.btn.small", { type: "button", onclick: () => this.onCancel() }, "Stop training");
-    this.plots = h("div.plots", {}, h("div", {}, this.loss, h("div.legend", {}, TERMS.map((term) => h("span", { dataset: { tip: term.symbol } }, h("i.stroke", { style: { "--swatch": term.colour } }), term.name)))), this.missed, this.parameters);
+    this.plots = h("div.plots", {}, h("div", {}, this.loss, this.legend), this.missed, this.parameters);
     this.note = h("p.small.muted", { style: { padding: "var(--s-2) var(--s-4) var(--s-4)" } });
     this.node = h("details.card.drawer", { ontoggle: () => this.draw() }, h("summary", {}, icon("right", "caret"), h("h2", {}, "Training"), this.facts, this.state),
       this.plots, this.note, h("div", { style: { padding: "0 var(--s-4) var(--s-4)" } }, this.stop));
@@ -41,7 +48,8 @@ export class Training {
     if (run.id !== this.runId) this.items = [];
     this.runId = run.id;
     this.run = run;
-    const facts = run.kind === "performance" ? [run.iteration ? `step ${run.iteration}` : null, run.loss === null ? null : `loss ${number(run.loss)}`, run.violations === null ? null : explained(run.violations)] : [`round ${run.round}`, plural(run.answered, "answer")];
+    const facts = run.kind === "performance" ? [run.iteration ? `step ${run.iteration}` : null, run.loss === null ? null : run.mode === "certified" ? `${number(run.loss, 2)} tools expected wrong` : `loss ${number(run.loss)}`, run.violations === null ? null : explained(run.violations)] : [`round ${run.round}`, plural(run.answered, "answer")];
+    fill(this.legend, termsOf(run).map((term) => h("span", { dataset: { tip: term.symbol } }, h("i.stroke", { style: { "--swatch": term.colour } }), term.name)));
     fill(this.facts, facts.filter(Boolean).map((text) => h("span", {}, text)));
     const words = { queued: "about to start", training: "learning", waiting_for_expert: "paused until you answer", cancelling: "stopping" };
     this.state.textContent = words[run.state] ?? "";
@@ -76,7 +84,7 @@ export class Training {
   draw() {
     if (!this.node.open || !this.node.isConnected || this.plots.hidden) return;
     const x = this.items.map((item) => item.iteration);
-    drawCurves(this.loss, { title: "Loss, by part", x, series: TERMS.map((term) => ({ name: term.name, colour: term.colour, values: this.items.map((item) => item.terms[term.key]) })) });
+    drawCurves(this.loss, { title: this.run.mode === "certified" ? "What is still open" : "Loss, by part", x, series: termsOf(this.run).map((term) => ({ name: term.name, colour: term.colour, values: this.items.map((item) => item.terms[term.key]) })) });
     drawCurves(this.missed, { title: "Demonstrations not yet explained", x, whole: true, series: [{ name: "not explained", colour: "var(--ink)", values: this.items.map((item) => item.violations) }] });
   }
 }

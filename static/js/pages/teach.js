@@ -31,7 +31,7 @@ async function answer(query, choice) {
   try {
     const given = await post(`/queries/${encodeURIComponent(query.id)}/answer`, { value: choice.value });
     state.answers.push(given);
-    toast(`Answered: ${choice.label}`, { undo: () => undo(given) });
+    toast(choice.value === "both_wrong" ? `Then show us: ${query.tool_name} waits on the record page` : `Answered: ${choice.label}`, { undo: () => undo(given) });
   } catch (error) {
     complain(error);
   }
@@ -126,7 +126,7 @@ function drawTrainingHead() {
   const { run } = state;
   const words = run.message || STATE_WORDS[run.state];
   fill(trainingHead, h("div.title", {}, h("h1", {}, `Learning ${KIND_WORDS[run.kind]}`), h("p", { role: "status" }, words)),
-    h("div.next.calm", {}, h("p", {}, run.loss === null ? "" : h("span.num", {}, `step ${run.iteration}, loss ${number(run.loss)}`))));
+    h("div.next.calm", {}, h("p", {}, run.loss === null ? "" : h("span.num", {}, run.mode === "certified" ? `step ${run.iteration}` : `step ${run.iteration}, loss ${number(run.loss)}`))));
 }
 
 function head(words) {
