@@ -13,6 +13,7 @@ from app.geometry.tool import Array, Mesh
 
 Integers = NDArray[np.int64]
 FREE = -1  # beyond a free border
+FACING, ASIDE = np.cos(np.radians(30)), np.cos(np.radians(60))  # two edges lie opposite within 30 degrees, not at all beyond 60
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class Borders:
 
     region: Integers  # (B,) whose border it is
     beyond: Integers  # (B,) region on the other side, FREE without one
-    ends: Integers  # (B, 2) vertices
+    ends: Integers  # (B, 2) vertices, as the region's own triangle lists them: the region lies to the left
     length: Array  # (B,) metres
 
     def shared(self, n: int) -> Array:
@@ -49,7 +50,8 @@ def find_borders(mesh: Mesh, labels: NDArray[np.int32]) -> Borders:
     beyond[first], beyond[second] = owner[second], owner[first]
     crowded = _inside_crowded(edges, flat, owner, count)
     listed = (owner >= 0) & (beyond != owner) & ~crowded
-    ends = edges[flat[listed]]
+    faces = mesh.faces.astype(np.int64)
+    ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)[listed]
     length = np.linalg.norm(mesh.vertices[ends[:, 0]] - mesh.vertices[ends[:, 1]], axis=1)
     return Borders(owner[listed], beyond[listed], ends, length)
 
@@ -76,8 +78,10 @@ def corner_neighbours(mesh: Mesh, labels: NDArray[np.int32], shared: Array) -> N
 def opposite_lengths(mesh: Mesh, borders: Borders, normals: Array) -> Array:
     """Length of b on the side opposite to a free side of a (n, n), metres.
 
-    The outer border of a region, seen along its mean normal, is dealt to the four sides of its smallest rectangle. A side
-    that is only partly free counts with its free share.
+    Seen along the region's mean normal, two border edges lie opposite when they look in opposite directions: fully within
+    FACING, not at all beyond ASIDE, partly in between. An edge counts with the free share of all the border opposite to it, so a
+    rectangle's side counts whole, half when the side across is half free, and any polygon or arc has an answer that changes
+    smoothly with its shape.
 
     Paper: the boundary-edge features (3, 4) count, per free side of a region, the neighbours across from it.
     """
@@ -91,12 +95,13 @@ def opposite_lengths(mesh: Mesh, borders: Borders, normals: Array) -> Array:
         outer = _outer_loop(ends, length)
         ends, beyond, length = ends[outer], beyond[outer], length[outer]
         flat = mesh.vertices[ends] @ tangent_frame(normals[a]).T  # (B, 2, 2)
-        side = _rectangle_side(flat)
-        whole = np.bincount(side, weights=length, minlength=4)
-        free = np.bincount(side, weights=length * (beyond == FREE), minlength=4) / np.maximum(whole, 1e-300)
+        way = flat[:, 1] - flat[:, 0]
+        way /= np.maximum(np.linalg.norm(way, axis=1), 1e-300)[:, None]
         inner = beyond != FREE
-        across = (side[inner] + 2) % 4
-        np.add.at(result[a], beyond[inner], length[inner] * free[across])
+        weight = np.clip((-way[inner] @ way.T - ASIDE) / (FACING - ASIDE), 0, 1)
+        across = weight @ length
+        share = np.divide(weight[:, ~inner] @ length[~inner], across, out=np.zeros_like(across), where=across > 1e-9 * length.sum())
+        np.add.at(result[a], beyond[inner], length[inner] * share)
     return result
 
 
@@ -116,15 +121,6 @@ def _outer_loop(ends: Integers, length: Array) -> NDArray[np.bool_]:
     graph = coo_matrix((np.ones(len(at)), (at[:, 0], at[:, 1])), shape=(size, size))
     _, loop = connected_components(graph, directed=False)
     return loop[at[:, 0]] == np.argmax(np.bincount(loop[at[:, 0]], weights=length))
-
-
-def _rectangle_side(flat: Array) -> Integers:
-    """Nearest side 0..3 (+u, +v, -u, -v) of the smallest rectangle for each edge (B, 2, 2)."""
-    axes = smallest_rectangle(flat.reshape(-1, 2))
-    low, high = (flat.reshape(-1, 2) @ axes.T).min(axis=0), (flat.reshape(-1, 2) @ axes.T).max(axis=0)
-    middle = flat.mean(axis=1) @ axes.T
-    away = np.concatenate([high - middle, middle - low], axis=1)  # (B, 4): +u, +v, -u, -v
-    return np.argmin(away, axis=1)
 
 
 def smallest_rectangle(points: Array) -> Array:

@@ -65,6 +65,9 @@ class TestUnitGrid:
         assert np.flatnonzero(self.graph.opposite[1]).tolist() == [5]
         assert (self.graph.opposite[5] == 0).all()
 
+    def test_opposite_does_not_depend_on_the_sides_names(self) -> None:
+        assert self.graph.opposite.sum(axis=1) == pytest.approx(np.array([2, 1, 1, 2, 1, 0, 0, 1, 2, 1, 1, 2]) / 4)
+
     def test_areas_heights_angles_and_curvature(self) -> None:
         assert self.graph.area == pytest.approx(1 / 12)
         assert [r.area for r in self.tool.regions] == pytest.approx([1.0] * 12)
@@ -189,10 +192,7 @@ def test_rigid_motion_about_z_leaves_the_graph_alone(mould: Mould) -> None:
             assert np.allclose(getattr(before.graph, name), getattr(after.graph, name)[match], atol=1e-6), name
 
 
-TIES = pytest.mark.xfail(strict=True, reason="the rim's arc has edges equally near two sides of the rectangle; rounding decides")
-
-
-@pytest.mark.parametrize("mould", [pytest.param(m, id=m.name, marks=[TIES] if m.name.startswith("Dish") else []) for m in MOULDS])
+@pytest.mark.parametrize("mould", MOULDS, ids=lambda m: m.name)
 def test_rigid_motion_about_z_leaves_opposite_sides_alone(mould: Mould) -> None:
     before = measure(mould.mesh, mould.labels)
     for angle, shift in MOTIONS:
@@ -255,3 +255,33 @@ def test_labels_that_name_nothing_are_refused() -> None:
         measure(mesh, np.full_like(labels, -1))
     with pytest.raises(InvalidInput, match="names no region"):
         measure(mesh, labels[:-1])
+
+
+@pytest.mark.parametrize(("sides", "expected"), [(4, [0, 1, 0]), (6, [0, 0, 1, 0, 0]), (3, [0, 0]), (8, [])])
+@pytest.mark.parametrize("turn", [0.0, 0.3, 2.0])
+def test_opposite_in_a_regular_polygon(sides: int, expected: list[float], turn: float) -> None:
+    """One side is free, beyond each other one lies a triangle: only the parallel side is opposite (octagon: 45 degrees count partly)."""
+    at = turn + 2 * np.pi * np.arange(sides) / sides
+    inner = np.stack([np.cos(at), np.sin(at), np.zeros(sides)], axis=1)
+    middle = at + np.pi / sides
+    tips = 2 * np.stack([np.cos(middle), np.sin(middle), np.zeros(sides)], axis=1)
+    core = [[sides * 2, k, (k + 1) % sides] for k in range(sides)]
+    outside = [[k, sides + k, (k + 1) % sides] for k in range(1, sides)]
+    mesh = Mesh(np.concatenate([inner, tips, np.zeros((1, 3))]), np.array(core + outside, np.int32))
+    tool = measure(mesh, np.array([0] * sides + list(range(1, sides)), np.int32))
+    order = [int(tool.labels[sides + k]) for k in range(sides - 1)]
+    found = tool.graph.opposite[int(tool.labels[0]), order] * sides
+    if sides == 8:
+        # at 45 degrees a side counts partly, and has one whole and two such sides across
+        partly = (np.cos(np.pi / 4) - 0.5) / (np.cos(np.pi / 6) - 0.5)
+        expected = [0, 0, partly / (1 + 2 * partly), 1 / (1 + 2 * partly), partly / (1 + 2 * partly), 0, 0]
+    assert found == pytest.approx(expected, abs=1e-9)
+
+
+def test_opposite_counts_with_the_free_share() -> None:
+    """Unit square in the middle of a column; half of its left side has a neighbour: the right neighbour counts half."""
+    x, y = np.meshgrid([0.0, 1, 2, 3], [0.0, 0.5, 1], indexing="ij")
+    cells = np.array([[0, -1], [1, 1], [2, 2]])
+    tool = measure(*surface(np.stack([x, y, np.zeros_like(x)], -1), cells))
+    at = {tuple(r.centroid[:2].round(6)): i for i, r in enumerate(tool.regions)}
+    assert tool.graph.opposite[at[1.5, 0.5], at[2.5, 0.5]] == pytest.approx(0.5 / 4)
