@@ -33,7 +33,7 @@ def recut(
     Args:
         part: The part.
         parameters: How finely to cut.
-        tree: Its merge tree.
+        tree: Its merge tree, of the smoothed part when that is asked for.
         before: The tool as it was cut so far; regions that stay the same keep the names people gave them.
         locked: Regions of `before` that stay.
         report: Told the progress.

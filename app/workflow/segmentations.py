@@ -86,6 +86,8 @@ def recut_tool(ctx: Context, tool_id: str, parameters: Json, segmentation_id: st
             raise InvalidInput(f"{row.name} comes with its regions; only tools made from a CAD file can be cut anew.")
         if tree is None:
             raise Conflict(f"{row.name} was read in before its merges were kept. Cut it once in the background, then this works at once.")
+        if known.denoise and row.part_sha:
+            tree = ctx.values.denoised_tree(row.part_sha)
         return before_id, before, part, tree
 
     before_id, before, part, tree = ctx.store.read(value)

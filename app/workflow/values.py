@@ -12,6 +12,7 @@ from app.geometry.carry_over import RegionMap, map_regions
 from app.geometry.importing import ImportedPart
 from app.geometry.merge_tree import MergeTree
 from app.geometry.pieces import tree_for
+from app.geometry.segmentation import part_tree
 from app.geometry.tool import Tool
 from app.sequencing.features import FEATURE_SETS, FeatureSet, Interaction
 from app.sequencing.problem import SequencingProblem
@@ -78,6 +79,16 @@ class Values:
         if tree_sha is None:
             return None
         return self._trees.get(tree_sha, lambda: MergeTree.from_bytes(self._store.artifacts.get(tree_sha)))
+
+    def denoised_tree(self, part_sha: str) -> MergeTree:
+        """The merge tree of a scan after smoothing; made once, not kept on disk."""
+
+        def make() -> MergeTree:
+            part = self.part(part_sha)
+            assert part is not None
+            return part_tree(part, denoise=True)
+
+        return self._trees.get((part_sha, "denoised"), make)
 
     def part(self, part_sha: str | None) -> ImportedPart | None:
         """A cleaned part."""

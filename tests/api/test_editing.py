@@ -241,7 +241,9 @@ def test_slider_answers_at_once_and_leaves_locked_regions_alone(api: Api) -> Non
     again = api.until(f"/tools/{tool['id']}", lambda row: row["state"] == "ready")
     assert again["edit"]["undo"].startswith("Cut into ")
     assert next(r for r in regions(api, tool) if r["name"] == "Lid")["area_mm2"] == pytest.approx(kept["area_mm2"], rel=1e-9)
-    for _ in range(5):
+    smooth = api.post(path, {"target": 5, "denoise": True, "now": True})
+    assert smooth["edit"]["locked"] == [0]
+    for _ in range(6):
         back = api.post(f"{path}/undo", status=200)
     assert back["region_count"] == tool["region_count"]
     assert back["segmentation_id"] == tool["segmentation_id"]
