@@ -1,12 +1,13 @@
 """Policies and the plans they make for tools."""
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Response
 from pydantic import Field
 
 from app.api.dependencies import Body, Ctx, Json, Paging, RegionOrder, Row, located, page
 from app.api.idempotency import ActionRoute, IdempotencyKey
+from app.sequencing.constraints import Constraints
 from app.workflow import policies as workflow
 
 router = APIRouter(tags=["policies"], route_class=ActionRoute)
@@ -53,10 +54,33 @@ class PolicyPage(Row):
     next: str | None
 
 
+RegionId = Annotated[int, Field(ge=0, le=999)]
+Regions = Annotated[list[RegionId], Field(default_factory=list, max_length=200)]
+
+Group = Annotated[list[RegionId], Field(min_length=1, max_length=200)]
+
+
+class OrderConstraints(Body):
+    """Wishes about an order; regions by id. Wishes that contradict each other are refused and named."""
+
+    before: Annotated[list[tuple[Group, Group]], Field(default_factory=list, max_length=400)]  # groups: the first before the second
+    first: RegionId | None = None
+    last: RegionId | None = None
+    never_next: Annotated[list[tuple[RegionId, RegionId]], Field(default_factory=list, max_length=400)]  # b never right after a
+    skip: Regions  # left undone
+    done: Regions  # finished already, in this order
+
+    def value(self) -> Constraints:
+        """As the core sees it."""
+        before = tuple((tuple(first), tuple(second)) for first, second in self.before)
+        return Constraints(before, self.first, self.last, tuple(self.never_next), tuple(self.skip), tuple(self.done))
+
+
 class NewPlan(Body):
-    """The tool to plan for."""
+    """The tool to plan for, and what the order must respect."""
 
     tool_id: Annotated[str, Field(max_length=64)]
+    constraints: OrderConstraints | None = None
 
 
 class WhatIf(Body):
@@ -101,6 +125,7 @@ class Plan(Row):
     milliseconds: float
     effort: float | None
     tie_settled_by: str | None
+    constraints: dict[str, Any] | None = None  # what the order respects, as asked
     features: list[PlanFeature]
     steps: list[PlanStep]
     demonstrated: bool
@@ -150,7 +175,7 @@ def list_plans(ctx: Ctx, policy_id: str, paging: Paging) -> PlanPage:
 @router.post("/policies/{policy_id}/plans", status_code=201, response_model=Plan)
 def make_plan(ctx: Ctx, policy_id: str, body: NewPlan, response: Response, _key: IdempotencyKey = None) -> Json:
     """The lowest-cost sequence for a tool."""
-    return located(response, "plans", workflow.make_plan(ctx, policy_id, body.tool_id))
+    return located(response, "plans", workflow.make_plan(ctx, policy_id, body.tool_id, body.constraints and body.constraints.value()))
 
 
 @router.get("/plans/{plan_id}", response_model=Plan)

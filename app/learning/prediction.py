@@ -3,10 +3,11 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from app.learning.effort_features import effort_penalty
+from app.learning.effort_features import effort_ends, effort_penalty
 from app.learning.policy import Policy
 from app.learning.qp import Array
 from app.sequencing.bounds import lower_bound
+from app.sequencing.constraints import Constraints, resolve
 from app.sequencing.features import Feature
 from app.sequencing.problem import SequencingProblem
 from app.sequencing.shortest import gap_between, shortest_sequence
@@ -33,7 +34,12 @@ class Prediction:
         return gap_between(self.cost, self.bound)
 
 
-def predict(problem: SequencingProblem, policy: Policy, should_stop: Callable[[], bool] = lambda: False) -> Prediction:
+def predict(
+    problem: SequencingProblem,
+    policy: Policy,
+    should_stop: Callable[[], bool] = lambda: False,
+    constraints: Constraints | None = None,
+) -> Prediction:
     """The lowest-cost sequence; among equally cheap ones the one of least effort (Eq. 8), then the lowest region ids.
 
     Where the sequence can't be proved the cheapest, a lower bound says how far it may be off; `should_stop` ends the search
@@ -41,13 +47,16 @@ def predict(problem: SequencingProblem, policy: Policy, should_stop: Callable[[]
 
     Raises:
         StalePolicy: The policy belongs to another feature set, version or interactions.
+        ContradictoryConstraints: The constraints can't hold together.
     """
     policy.check(problem)
     effort = policy.effort_weights
     breaks = effort is not None and bool((effort != 0).any())
-    tie_break = (lambda s: effort_penalty(problem, effort, s)) if effort is not None and breaks else None
-    best = shortest_sequence(problem, policy.weights, tie_break)
-    bound = best.cost if best.proved else lower_bound(problem, policy.weights, best.cost, should_stop=should_stop)
+    tie_break = effort_ends(problem, effort) if effort is not None and breaks else None
+    best = shortest_sequence(problem, policy.weights, tie_break, constraints)
+    bound = best.cost
+    if not best.proved:
+        bound = lower_bound(problem, policy.weights, best.cost, resolve(constraints, problem.n), should_stop=should_stop)
     settled = None
     if best.ties > 1:
         settled = "least effort at start and end" if breaks else "region names: no effort was learned"
@@ -59,7 +68,7 @@ def predict(problem: SequencingProblem, policy: Policy, should_stop: Callable[[]
         bound=bound,
         method=best.method,
         effort=None if effort is None else effort_penalty(problem, effort, best.sequence),
-        step_parts=problem.step_features(best.sequence) * policy.weights,
+        step_parts=problem.steps_of(best.sequence) * policy.weights,
         labels=problem.columns,
         tie_settled_by=settled,
     )

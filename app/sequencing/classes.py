@@ -6,17 +6,22 @@ learner asks about classes instead, each with the number of its members.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.geometry.tool import Array
-from app.sequencing import kernels
+from app.sequencing.comparison import kendall_tau
+from app.sequencing.constraints import Constraints, check_order, resolve
+from app.sequencing.forms import step_costs
+from app.sequencing.nearly import Nearly, explore
 from app.sequencing.omega import equal_sums, equal_sums_searched
 from app.sequencing.problem import EXACT_LIMIT, TENSOR_LIMIT, SequencingProblem, check_sequence
-from app.sequencing.shortest import TOLERANCE, Solution, lowest_orders, shortest_sequence, solve, tie_count
+from app.sequencing.shortest import TOLERANCE, Solution, reason_against, shortest_sequence, solve
 
 CAP = 256  # members of a class that are listed
+FIRST_REACH = 4  # of the costs one step beside the cheapest sequence, which one the first search for classes reaches to
+CLASS_NODES = 400_000  # of the graph that classes are counted in
 
 
 @dataclass(frozen=True)
@@ -24,7 +29,7 @@ class CostClass:
     """All sequences of one cost."""
 
     cost: float
-    count: int  # exact for at most 20 regions, else those found
+    count: int  # exact while the search is, else those found
     sequence: tuple[int, ...]  # a representative
 
 
@@ -36,7 +41,9 @@ class Equivalents:
     complete: bool  # these are all
 
 
-def best_classes(problem: SequencingProblem, w: Array, k: int, tolerance: float = TOLERANCE) -> tuple[CostClass, ...]:
+def best_classes(
+    problem: SequencingProblem, w: Array, k: int, tolerance: float = TOLERANCE, constraints: Constraints | None = None
+) -> tuple[CostClass, ...]:
     """The k cheapest distinct cost classes, cheapest first; fewer when the tool has fewer.
 
     Args:
@@ -44,50 +51,68 @@ def best_classes(problem: SequencingProblem, w: Array, k: int, tolerance: float 
         w: Weights, shape (n + m,).
         k: Number of classes, at least 1.
         tolerance: Costs closer than this share of the cost scale (`shortest.solve`) are one class.
+        constraints: What the sequences must respect.
 
     Paper: Algorithm 1 takes the K shortest sequences; on symmetric tools these are mostly one cost, which would ask the
-    expert K times the same. Above 20 regions the classes are those among the best found sequence and its neighbours.
+    expert K times the same. Where the exact search is out of reach, the classes are those among the best found sequence
+    and its neighbours.
     """
-    if problem.n > EXACT_LIMIT:
-        return _classes_nearby(problem, w, k, tolerance)
-    solution = solve(problem, w)
-    merged = Merged(*kernels.distinct_classes(solution.table, solution.to_go, problem.n, k, tolerance * solution.scale))
-    orders = [_representative(solution, merged, j) for j in range(merged.filled[merged.row[0]])]
-    counts = merged.counts[merged.row[0]]
-    return tuple(CostClass(problem.cost(w, s), int(counts[j]), s) for j, s in enumerate(orders))
+    resolved = resolve(constraints, problem.n)
+    if reason_against(problem, resolved):
+        return _classes_nearby(problem, w, k, tolerance, constraints)
+    solution = solve(problem, w, resolved)
+    slack = tolerance * solution.scale
+    if not solution.graph.complete:
+        found = shortest_sequence(problem, w, constraints=constraints)
+        return (CostClass(found.cost, found.ties, found.sequence),)
+    graph, limit = _graph_of(solution, k, slack)
+    totals = graph.classes(k + 1, slack)
+    kept = [c for c in totals if c[0] <= limit][:k]
+    orders = [solution.named(order) for _, _, order in kept]
+    return tuple(CostClass(problem.cost_of(w, s), count, s) for s, (_, count, _) in zip(orders, kept, strict=True))
 
 
-@dataclass(frozen=True)
-class Merged:
-    """Distinct totals from each kept set of finished regions to the full set (`kernels.distinct_classes`)."""
-
-    totals: Array  # (S, k)
-    counts: NDArray[np.int64]  # (S, k)
-    filled: NDArray[np.int64]  # (S,)
-    row: NDArray[np.int64]  # (2^N,)
-
-
-def _representative(solution: Solution, merged: Merged, which: int) -> tuple[int, ...]:
-    """The sequence that opened class `which`, lowest ids first."""
-    order, state = [], 0
-    while state != (1 << solution.n) - 1:
-        target = merged.totals[merged.row[state], which]
-        error, a, which = min(
-            (abs(solution.table[state, a] + merged.totals[j, q] - target), a, q)
-            for a in range(solution.n)
-            for j in [merged.row[state | 1 << a]]
-            if not state >> a & 1 and j >= 0
-            for q in range(merged.filled[j])
-        )
-        assert error <= 1e-12 * solution.scale  # the opener's total was computed from these very numbers
-        order.append(a)
-        state |= 1 << a
-    return tuple(order)
+def _graph_of(solution: Solution, k: int, slack: float) -> tuple[Nearly, float]:
+    """A graph that holds the k cheapest classes completely, and the total up to which it holds every class."""
+    if not len(solution.v):
+        return solution.graph, np.inf  # few regions: it holds every sequence
+    costs = beside(solution, slack)
+    graph, limit = solution.graph, solution.graph.lowest + slack
+    reach = costs[min(FIRST_REACH, k, len(costs) - 1)] - graph.lowest
+    while len([c for c in graph.classes(k, slack) if c[0] <= limit]) < k and np.isfinite(limit):
+        limit = graph.lowest + reach if reach < 4 * solution.error / TOLERANCE else np.inf
+        wider = explore(solution.form, solution.v, solution.after, limit + slack + solution.error, CLASS_NODES)
+        if not wider.complete:
+            return graph, graph.lowest + reach / 2
+        graph, reach = wider, 2 * max(reach, 10 * slack)
+    return graph, limit
 
 
-def _classes_nearby(problem: SequencingProblem, w: Array, k: int, tolerance: float) -> tuple[CostClass, ...]:
-    best = shortest_sequence(problem, w).sequence
-    costs = sorted((problem.cost(w, s), s) for s in {best, *neighbours(best)})
+def beside(solution: Solution, slack: float) -> list[float]:
+    """Distinct costs of the sequences that leave the cheapest one once and go on in the best way, to single precision."""
+    graph, node, spent, found = solution.graph, 0, 0.0, [solution.graph.lowest]
+    n = solution.model.n
+    costs, state, last = np.empty(n), 0, n
+    while node < graph.end:
+        step_costs(solution.form, state, costs)
+        a, following = next(graph.tied(node, solution.tolerance))
+        for b in range(n):
+            if np.isfinite(costs[b]):
+                by_last = len(solution.after) > 0
+                key = (state | 1 << b) * (n if by_last else 1) + (b if by_last else 0)
+                found.append(spent + costs[b] + (solution.after[last, b] if by_last else 0.0) + float(solution.v[key]))
+        spent += costs[a] + (solution.after[last, a] if len(solution.after) else 0.0)
+        state, node, last = state | 1 << a, following, a
+    values = sorted(x for x in found if np.isfinite(x))
+    return [x for x, before in zip(values, [-np.inf, *values], strict=False) if x - before > slack + solution.error]
+
+
+def _classes_nearby(
+    problem: SequencingProblem, w: Array, k: int, tolerance: float, constraints: Constraints | None
+) -> tuple[CostClass, ...]:
+    best, resolved = shortest_sequence(problem, w, constraints=constraints).sequence, resolve(constraints, problem.n)
+    allowed = (s for s in neighbours(best) if s[: len(resolved.done)] == resolved.done and not check_order(s, resolved))
+    costs = sorted((problem.cost_of(w, s), s) for s in {best, *allowed})
     slack = tolerance * max(abs(costs[0][0]), 1e-300)
     classes: list[CostClass] = []
     for cost, sequence in costs:
@@ -111,34 +136,62 @@ def neighbours(sequence: tuple[int, ...]) -> set[tuple[int, ...]]:
     return found
 
 
-def optimal_sequences(problem: SequencingProblem, w: Array, cap: int = CAP) -> Equivalents:
+def optimal_sequences(problem: SequencingProblem, w: Array, cap: int = CAP, constraints: Constraints | None = None) -> Equivalents:
     """All cheapest sequences, lowest ids first, at most `cap`."""
-    if problem.n > EXACT_LIMIT:
-        return Equivalents((shortest_sequence(problem, w).sequence,), complete=False)
-    solution = solve(problem, w)
-    found = lowest_orders(solution, cap)
-    return Equivalents(tuple(found), complete=len(found) == tie_count(solution))
+    resolved = resolve(constraints, problem.n)
+    if not reason_against(problem, resolved):
+        solution = solve(problem, w, resolved)
+        if solution.graph.complete:
+            found = tuple(solution.named(s) for s in solution.graph.members(solution.tolerance, cap))
+            return Equivalents(found, complete=len(found) == solution.graph.count(solution.tolerance))
+    return Equivalents((shortest_sequence(problem, w, constraints=constraints).sequence,), complete=False)
 
 
-def class_size(problem: SequencingProblem, w: Array) -> int:
-    """Number of cheapest sequences."""
-    return 1 if problem.n > EXACT_LIMIT else tie_count(solve(problem, w))
+def class_size(problem: SequencingProblem, w: Array, constraints: Constraints | None = None) -> int:
+    """Number of cheapest sequences; 1 where the exact search is out of reach."""
+    resolved = resolve(constraints, problem.n)
+    if reason_against(problem, resolved):
+        return 1
+    solution = solve(problem, w, resolved)
+    return solution.graph.count(solution.tolerance) if solution.graph.complete else 1
 
 
-def equivalent_sequences(problem: SequencingProblem, sequence: Sequence[int], cap: int = CAP) -> Equivalents:
+def equivalent_sequences(
+    problem: SequencingProblem, sequence: Sequence[int], cap: int = CAP, constraints: Constraints | None = None
+) -> Equivalents:
     """Omega: all sequences with the same feature sum, so the same cost under any weights (Eq. 3).
 
     The given sequence comes first, then the others with the lowest ids first. Complete for at most 20 regions unless the
-    cap (or, above 14, the search limit) was reached; above 20 regions only exchanges of two regions are looked at.
+    cap (or, above 14, the search limit) was reached; above 20 regions only exchanges of two regions are looked at. With
+    constraints, only those that respect them; regions can't be skipped here, because sums over other regions never compare.
     """
-    order = check_sequence(sequence, problem.n)
-    if problem.n <= TENSOR_LIMIT:
+    order, resolved = check_sequence(sequence, problem.n), resolve(constraints, problem.n)
+    if problem.n <= TENSOR_LIMIT and not problem.last:
         found, complete = equal_sums(problem, order, cap)
-    elif problem.n <= EXACT_LIMIT:
+    elif problem.n <= EXACT_LIMIT and not problem.last:
         found, complete = equal_sums_searched(problem, order, cap)
     else:
         total = problem.feature_sum(order)
         found = [s for s in sorted(neighbours(order)) if np.allclose(problem.feature_sum(s), total, rtol=1e-9, atol=1e-9)]
         complete = False
-    others = [s for s in found if s != order]
+    others = [s for s in found if s != order and s[: len(resolved.done)] == resolved.done and not check_order(s, resolved)]
     return Equivalents((order, *others)[:cap], complete)
+
+
+def diverse(sequences: Sequence[tuple[int, ...]], k: int) -> tuple[tuple[int, ...], ...]:
+    """k of the sequences as unlike each other as a greedy choice finds: the farthest pair, then always the one farthest from
+    its nearest chosen one (Kendall's tau); ties by position."""
+    pool = list(dict.fromkeys(sequences))
+    if k >= len(pool):
+        return tuple(pool)
+    if k == 1:
+        return (pool[0],)
+    alike = np.eye(len(pool))
+    for i, j in combinations(range(len(pool)), 2):
+        alike[i, j] = alike[j, i] = kendall_tau(pool[i], pool[j])
+    chosen = [int(i) for i in np.unravel_index(int(alike.argmin()), alike.shape)]
+    while len(chosen) < k:
+        nearest = alike[:, chosen].max(axis=1)
+        nearest[chosen] = np.inf
+        chosen.append(int(nearest.argmin()))
+    return tuple(pool[i] for i in chosen)

@@ -128,13 +128,13 @@ def _against_the_past(c: Constraints, edges: Edges, free: tuple[int, ...], calle
     """Finished regions can't be moved any more."""
     place = {a: i for i, a in enumerate(c.done)}
     for (a, b), wish in edges.items():
+        if a == b and a not in c.skip:
+            raise ContradictoryConstraints(f"{called[a]} can't come before itself.")
         if b in place and (a in free or (a in place and place[a] > place[b])):
             when = "not finished yet" if a in free else "was finished after it"
             raise ContradictoryConstraints(
                 f"{wish} can't hold: {called[b]} is finished already, and {called[a]} {'is ' * (a in free)}{when}."
             )
-        if a == b and a in free:
-            raise ContradictoryConstraints(f"{called[a]} can't come before itself.")
     for a, b in c.never_next:
         if a in place and b in place and place[b] == place[a] + 1:
             raise ContradictoryConstraints(f"{called[b]} never directly after {called[a]} can't hold: they were finished in that order.")

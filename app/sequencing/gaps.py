@@ -89,3 +89,87 @@ def hull_gaps(inside: NDArray[np.bool_], low: Array, high: Array, area: Array) -
 def _turn(points: Array, a: int, b: int, c: int) -> float:
     """Positive when the way from a over b to c turns left."""
     return (points[b, 0] - points[a, 0]) * (points[c, 1] - points[a, 1]) - (points[b, 1] - points[a, 1]) * (points[c, 0] - points[a, 0])
+
+
+@nb.njit(cache=True, nogil=True)
+def box_table(
+    low: Array, high: Array, area: Array, plain: bool, always: NDArray[np.bool_], free: NDArray[np.int64], out: NDArray[np.float32]
+) -> None:
+    """`box_gaps` of every subset of the free regions together with those that are `always` in; out[s] for the bit mask s.
+
+    A box is known by the ranks of its four sides, so its area is looked up; sides and areas of a set follow from those of its
+    low and its high half of the bits.
+    """
+    n = len(free)
+    half = n // 2
+    sides = (_ranks(low[:, 0]), _ranks(low[:, 1]), _ranks(high[:, 0]), _ranks(high[:, 1]))
+    boxes = _box_areas(low, high, area, plain, sides)
+    first = _half_sides(sides, area, free[:half])
+    second = _half_sides(sides, area, free[half:])
+    x0, y0, x1, y1, own0, size0 = len(area), len(area), -1, -1, 0.0, 0
+    for a in np.flatnonzero(always):
+        x0, y0, x1, y1 = min(x0, sides[0][a]), min(y0, sides[1][a]), max(x1, sides[2][a]), max(y1, sides[3][a])
+        own0, size0 = own0 + area[a], size0 + 1
+    mask = (1 << half) - 1
+    for s in range(1 << n):
+        i, j = s & mask, s >> half
+        if size0 + first[5][i] + second[5][j] < 2:
+            out[s] = 0
+            continue
+        left, down = min(x0, first[0][i], second[0][j]), min(y0, first[1][i], second[1][j])
+        right, up = max(x1, first[2][i], second[2][j]), max(y1, first[3][i], second[3][j])
+        box = boxes[left, down, right, up]
+        out[s] = 1 - (own0 + first[4][i] + second[4][j]) / box if box > 0 else 0.0
+
+
+@nb.njit(cache=True, nogil=True)
+def _ranks(values: Array) -> NDArray[np.int64]:
+    return np.searchsorted(np.unique(values), values)
+
+
+@nb.njit(cache=True, nogil=True)
+def _box_areas(low: Array, high: Array, area: Array, plain: bool, sides: tuple[NDArray[np.int64], ...]) -> Array:
+    """Area by the ranks of the left, lower, right and upper side."""
+    xs, ys, xe, ye = np.unique(low[:, 0]), np.unique(low[:, 1]), np.unique(high[:, 0]), np.unique(high[:, 1])
+    out, share = np.zeros((len(xs), len(ys), len(xe), len(ye))), np.empty(len(area))
+    for i in range(len(xs)):
+        for k in range(len(xe)):
+            for b in range(len(area)):
+                share[b] = area[b] * _common(low[b, 0], high[b, 0], xs[i], xe[k])
+            for j in range(len(ys)):
+                for m in range(len(ye)):
+                    if plain:
+                        out[i, j, k, m] = (xe[k] - xs[i]) * (ye[m] - ys[j])
+                    else:
+                        total = 0.0
+                        for b in range(len(area)):
+                            if share[b] != 0:
+                                total += share[b] * _common(low[b, 1], high[b, 1], ys[j], ye[m])
+                        out[i, j, k, m] = total
+    return out
+
+
+@nb.njit(cache=True, nogil=True)
+def _common(low: float, high: float, start: float, end: float) -> float:
+    """Share of low..high inside start..end; without extent it is inside or not."""
+    common = min(high, end) - max(low, start)
+    if high > low:
+        return max(common, 0.0) / (high - low)
+    return 0.0 if common < 0 else 1.0
+
+
+@nb.njit(cache=True, nogil=True)
+def _half_sides(sides: tuple[NDArray[np.int64], ...], area: Array, regions: NDArray[np.int64]):  # type: ignore[no-untyped-def]
+    """Ranks of the sides, area and size of every subset of a few regions."""
+    size = 1 << len(regions)
+    far = len(area)
+    left, down = np.full(size, far), np.full(size, far)
+    right, up, count, own = np.full(size, -1), np.full(size, -1), np.zeros(size, np.int64), np.zeros(size)
+    for i in range(len(regions)):
+        a = regions[i]
+        for s in range(1 << i):
+            t = (1 << i) | s
+            left[t], down[t] = min(left[s], sides[0][a]), min(down[s], sides[1][a])
+            right[t], up[t] = max(right[s], sides[2][a]), max(up[s], sides[3][a])
+            count[t], own[t] = count[s] + 1, own[s] + area[a]
+    return left, down, right, up, own, count

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from app.sequencing.features import (
     interaction_column,
     interaction_values,
 )
+from app.sequencing.last import LastFeature
 
 TENSOR_LIMIT = 14  # regions: the table of all transitions takes 24 MB for 13 columns
 EXACT_LIMIT = 20  # regions: the table of all costs takes 168 MB
@@ -32,15 +34,16 @@ class SequencingProblem:
     graph: RegionGraph
     features: FeatureSet
     interactions: tuple[Interaction, ...] = DEFAULT_INTERACTIONS
-    columns: tuple[Feature, ...] = field(init=False)  # n features, then m interactions
-    _kept: dict[str, Array] = field(default_factory=dict, init=False, repr=False)
+    last: tuple[LastFeature, ...] = ()  # columns that depend on the region before
+    columns: tuple[Feature, ...] = field(init=False)  # n features, then m interactions, then those of `last`
+    kept: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
         added = tuple(interaction_column(k, i, self.features) for k, i in enumerate(self.interactions))
-        object.__setattr__(self, "columns", self.features.columns + added)
+        object.__setattr__(self, "columns", self.features.columns + added + tuple(f.feature for f in self.last))
 
-    def __reduce__(self) -> tuple[type, tuple[RegionGraph, FeatureSet, tuple[Interaction, ...]]]:
-        return type(self), (self.graph, self.features, self.interactions)
+    def __reduce__(self) -> tuple[type, tuple[RegionGraph, FeatureSet, tuple[Interaction, ...], tuple[LastFeature, ...]]]:
+        return type(self), (self.graph, self.features, self.interactions, self.last)
 
     @property
     def n(self) -> int:
@@ -52,17 +55,22 @@ class SequencingProblem:
         phi = feature_values(self.graph, self.features, done)
         return np.concatenate([phi, interaction_values(self.features, self.interactions, phi)], axis=-1)
 
+    @property
+    def width(self) -> int:
+        """Number of columns that don't depend on the region before."""
+        return len(self.columns) - len(self.last)
+
     def tensor(self) -> Array:
         """phi and phi_int of all transitions, (2^N, N, n + m), NaN where the region is already done. Don't write into it."""
         if self.n > TENSOR_LIMIT:
             raise InvalidInput(f"The table of all transitions is kept for at most {TENSOR_LIMIT} regions; this tool has {self.n}.")
-        if "tensor" not in self._kept:
+        if "tensor" not in self.kept:
             sets = all_sets(self.n)
             table = np.concatenate([self.values(sets[i : i + CHUNK]) for i in range(0, len(sets), CHUNK)])
             table[sets] = np.nan
             table.flags.writeable = False
-            self._kept["tensor"] = table
-        return self._kept["tensor"]
+            self.kept["tensor"] = table
+        return self.kept["tensor"]
 
     def cost_table(self, w: Array) -> Array:
         """Cost of every transition under weights w (n + m,), (2^N, N), NaN where already done."""
@@ -82,12 +90,26 @@ class SequencingProblem:
     def step_features(self, sequence: Sequence[int]) -> Array:
         """phi and phi_int of each step, (N, n + m), in the order of the sequence."""
         order = np.array(check_sequence(sequence, self.n), np.int64)
-        if self.n <= TENSOR_LIMIT:
+        if self.n <= TENSOR_LIMIT and not self.last:
             bits = np.int64(1) << order
             return self.tensor()[np.cumsum(bits) - bits, order]
-        rank = np.empty(self.n, np.int64)
-        rank[order] = np.arange(self.n)
-        return self.values(rank[None, :] < np.arange(self.n)[:, None])[np.arange(self.n), order]
+        return self.steps_of(order)
+
+    def steps_of(self, order: Sequence[int] | NDArray[np.int64]) -> Array:
+        """The same for an order that may leave regions out, (len, n + m)."""
+        order = np.asarray(order, np.int64)
+        if not len(order):
+            return np.zeros((0, len(self.columns)))
+        done = np.zeros((len(order), self.n), np.bool_)
+        for k, a in enumerate(order[:-1]):
+            done[k + 1 :, a] = True
+        steps = self.values(done)[np.arange(len(order)), order]
+        extra = [np.concatenate([[f.start[order[0]]], f.between[order[:-1], order[1:]]]) for f in self.last]
+        return np.column_stack([steps, *extra]) if extra else steps
+
+    def cost_of(self, w: Array, order: Sequence[int]) -> float:
+        """Cost of an order that may leave regions out."""
+        return float(self.check_weights(w) @ self.steps_of(order).sum(axis=0))
 
     def feature_sum(self, sequence: Sequence[int]) -> Array:
         """Phi(xi), shape (n + m,): features added along the sequence."""

@@ -1,35 +1,51 @@
-"""The cheapest sequence of a tool (Eq. 1-2, Sec. IV-B): exact up to 20 regions, best found above.
+"""The cheapest sequence of a tool (Eq. 1-2, Sec. IV-B): exact while all sets of finished regions fit, best found above.
 
 Equally cheap sequences are told apart by a tie-break (the effort penalty), then by the lowest region ids, so that the
 answer is the same on every machine.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from app.geometry.tool import Array
+from app.errors import ContradictoryConstraints
+from app.geometry.tool import Array, region_letters
 from app.sequencing import kernels
+from app.sequencing.block import SMALLEST, Single
+from app.sequencing.constraints import Constraints, Resolved, listed, resolve
+from app.sequencing.exact import Limits, Model, costs_to_go, form_for, magnitude, model_for, why_not_exact
+from app.sequencing.forms import Form, step_costs
 from app.sequencing.large import best_found
-from app.sequencing.problem import EXACT_LIMIT, SequencingProblem
+from app.sequencing.last import LAST_LIMIT, after_last, costs_to_go_by_last
+from app.sequencing.nearly import Nearly, explore
+from app.sequencing.problem import SequencingProblem
 
 TOLERANCE = 1e-7  # relative: costs closer than this count as equal
+ROUNDING = 4e-6  # error of single-precision costs-to-go, as a share of the largest sum of absolute costs
 TIE_CAP = 2000  # equally cheap sequences that a tie-break looks at one by one
+LIMITS = Limits()
 
 TieBreak = Callable[[tuple[int, ...]], float]
+
+
+@dataclass(frozen=True, eq=False)
+class Ends:
+    """A tie-break that only looks at where a sequence starts and ends: exact in a class of any size."""
+
+    start: Array  # (N,) penalty of a as the first region
+    end: Array  # (N,) and as the last
 
 
 @dataclass(frozen=True)
 class Shortest:
     """A cheapest sequence and how sure we are of it."""
 
-    sequence: tuple[int, ...]
+    sequence: tuple[int, ...]  # finished regions first, skipped ones left out
     cost: float  # in float64 along the sequence
     ties: int  # sequences of this cost, this one included; 1 when not proved
     proved: bool
-    method: str  # plain words
+    method: str  # plain words: what was done, and why
     bound: float = -np.inf  # no sequence costs less; the cost itself when proved, -inf when not looked for
 
     @property
@@ -47,102 +63,189 @@ def gap_between(cost: float, bound: float) -> float:
 
 @dataclass(frozen=True)
 class Solution:
-    """The exact dynamic program of a problem under fixed weights."""
+    """The exact costs-to-go of a problem under fixed weights, and the graph of its cheapest sequences."""
 
-    table: Array  # (2^N, N) cost of each transition
-    to_go: Array  # (2^N,) cheapest cost from each set to the full one
+    model: Model
+    form: Form
+    after: Array  # what depends on the region before (`last.after_last`)
+    v: Single  # costs-to-go in single precision; empty for few regions
+    graph: Nearly  # all cheapest sequences, perhaps some more
     scale: float  # cost that relative tolerances refer to
+    error: float  # of v
 
     @property
     def tolerance(self) -> float:
         """Absolute difference of costs that still counts as a tie."""
         return TOLERANCE * self.scale
 
-    @property
-    def n(self) -> int:
-        return self.table.shape[1]
+    def named(self, order: tuple[int, ...]) -> tuple[int, ...]:
+        """The sequence of the tool's regions: finished ones, then the free ones that `order` numbers."""
+        return self.model.resolved.done + tuple(self.model.resolved.free[a] for a in order)
 
 
-def solve(problem: SequencingProblem, w: Array) -> Solution:
-    """Exact cost-to-go of every set, for at most 20 regions.
+def reason_against(problem: SequencingProblem, resolved: Resolved, limits: Limits = LIMITS) -> str | None:
+    """Why the exact search is not used; None when it is."""
+    n = len(resolved.free)
+    if (problem.last or resolved.never_next.any()) and n > LAST_LIMIT:
+        return f"costs depend on the region before, and {n} regions are more than the {LAST_LIMIT} searched exactly then"
+    return why_not_exact(problem, n, limits)
 
-    The scale is the lowest cost, or a thousandth of the largest cost any sequence could have where that is more (costs
-    may be negative and add up to nearly nothing).
+
+def solve(problem: SequencingProblem, w: Array, resolved: Resolved | None = None) -> Solution:
+    """Exact costs-to-go, and the graph of the cheapest sequences.
+
+    The scale is the lowest cost, or a thousandth of the largest sum of absolute costs where that is more (costs may be
+    negative and add up to nearly nothing).
+
+    Raises:
+        ContradictoryConstraints: No order avoids the forbidden neighbours.
     """
-    table = problem.cost_table(w)
-    to_go = kernels.lowest_to_go(table, problem.n)
-    return Solution(table, to_go, max(abs(float(to_go[0])), 1e-3 * kernels.largest_sum(table, problem.n), 1e-300))
+    w, resolved = problem.check_weights(w), resolved or resolve(None, problem.n)
+    model = model_for(problem, resolved)
+    form = form_for(model, w[: problem.width])
+    after = after_last(problem.last, w[problem.width :], resolved)
+    most = magnitude(form) + float(np.where(np.isfinite(after), np.abs(after), 0.0).sum())
+    v, error = np.zeros(0, np.float32), ROUNDING * most
+    limit = np.inf
+    if model.n >= SMALLEST:
+        v = costs_to_go_by_last(form, after) if len(after) else costs_to_go(model, form)
+        limit = lowest_cost(form, after, v) + error
+    graph = explore(form, v, after, limit)
+    if model.n and not (graph.complete and np.isfinite(graph.lowest)) and not (np.isfinite(limit) and not graph.complete):
+        raise ContradictoryConstraints(_forbidden(problem, resolved))
+    lowest = graph.lowest if graph.complete else limit - error
+    return Solution(model, form, after, v, graph, max(abs(lowest), 1e-3 * most, 1e-300), error)
+
+
+def lowest_cost(form: Form, after: Array, v: Single) -> float:
+    """Cheapest cost of a complete sequence, to single precision."""
+    n = form.start.shape[1]
+    first = np.empty(n)
+    step_costs(form, 0, first)
+    bits = np.int64(1) << np.arange(n)
+    return float((first + after[n] + v[bits * n + np.arange(n)]).min() if len(after) else (first + v[bits]).min())
+
+
+def _forbidden(problem: SequencingProblem, resolved: Resolved) -> str:
+    """The fewest forbidden neighbours without which there would be an order, each one needed."""
+    pairs = [(int(a), int(b)) for a, b in np.argwhere(resolved.never_next)]
+    plain = replace(problem, last=())
+    zero = np.zeros(len(plain.columns))
+    needed = pairs[:]
+    for pair in pairs:
+        fewer = np.zeros_like(resolved.never_next)
+        for a, b in (p for p in needed if p != pair):
+            fewer[a, b] = True
+        trial = replace(resolved, never_next=fewer)
+        model = model_for(plain, trial)
+        form, after = form_for(model, zero), after_last((), zero[:0], trial)
+        if not len(after):
+            continue
+        v = costs_to_go_by_last(form, after)
+        if not np.isfinite(lowest_cost(form, after, v)):
+            needed.remove(pair)
+    letters = region_letters(problem.n)
+    words = [f"{letters[b]} never directly after {letters[a]}" for a, b in needed]
+    also = " together with the precedence given" if resolved.before.any() else ""
+    return f"No order can have {listed(words)}{also}. Take one of these away."
 
 
 def cost_to_go(problem: SequencingProblem, w: Array) -> Array:
-    """Cheapest cost from every set of finished regions to the full set, (2^N,)."""
+    """Cheapest cost from every set of finished regions to the full set, (2^N,), from a table of all costs."""
     return kernels.lowest_to_go(problem.cost_table(w), problem.n)
 
 
-def shortest_sequence(problem: SequencingProblem, w: Array, tie_break: TieBreak | None = None) -> Shortest:
+def shortest_sequence(
+    problem: SequencingProblem,
+    w: Array,
+    tie_break: TieBreak | Ends | None = None,
+    constraints: Constraints | None = None,
+    limits: Limits = LIMITS,
+) -> Shortest:
     """The cheapest sequence under weights w.
 
     Args:
         problem: The tool and its features.
         w: Weights, shape (n + m,).
-        tie_break: Lower is better among equally cheap sequences. Exact over the whole class up to TIE_CAP members; in a
-            larger class over those with the lowest ids and one of each pair of first and last region, which is exact
-            for a penalty on the two ends.
+        tie_break: Lower is better among equally cheap sequences. `Ends` is exact in a class of any size; a function over the
+            whole class up to TIE_CAP members, in a larger one over those with the lowest ids.
+        constraints: What the order must respect.
+        limits: Regions and memory up to which the search is exact.
+
+    Raises:
+        ContradictoryConstraints: The constraints can't hold together.
 
     Paper: Dijkstra on an explicit graph there; the backward pass here also bears negative costs and needs no graph.
     """
-    if problem.n > EXACT_LIMIT:
-        sequence = best_found(problem, w)
-        method = "Best found: a beam search, then exact re-ordering of short stretches until nothing improves. Not proved optimal."
-        return Shortest(sequence, problem.cost(w, sequence), 1, proved=False, method=method)
-    solution = solve(problem, w)
-    ties = tie_count(solution)
-    candidates = lowest_orders(solution, TIE_CAP if tie_break else 1)
-    method = f"Exact: dynamic programming over all {1 << problem.n:,} sets of finished regions."
-    if tie_break and ties > len(candidates):
-        candidates += one_per_ends(solution)
-        method += f" Ties settled among {len(set(candidates)):,} of {ties:,} equal sequences, every pair of first and last region included."
-    sequence = min(candidates, key=lambda s: (tie_break(s), s)) if tie_break else candidates[0]
-    cost = problem.cost(w, sequence)
+    resolved = resolve(constraints, problem.n)
+    against = reason_against(problem, resolved, limits)
+    if against:
+        sequence = best_found(problem, w, resolved)
+        method = f"Best found: beam search, then exact re-ordering of short stretches. Not proved optimal: {against}."
+        return Shortest(sequence, problem.cost_of(w, sequence), 1, proved=False, method=method)
+    solution = solve(problem, w, resolved)
+    n = solution.model.n
+    method = f"Exact: dynamic programming over all {1 << n:,} sets of finished regions{' and the last one' if len(solution.after) else ''}."
+    if not solution.graph.complete:
+        order, ties = _walk(solution), 1
+        method += " So many sequences nearly tie that they were not counted."
+    else:
+        ties = solution.graph.count(solution.tolerance)
+        order, more = _settle(solution, tie_break, ties)
+        method += more
+    sequence = solution.named(order)
+    cost = problem.cost_of(w, sequence)
     return Shortest(sequence, cost, ties, proved=True, method=method, bound=cost)
 
 
-def tie_count(solution: Solution) -> int:
-    """Number of cheapest sequences."""
-    return int(kernels.count_lowest(solution.table, solution.to_go, solution.n, solution.tolerance)[0])
+def _settle(solution: Solution, tie_break: TieBreak | Ends | None, ties: int) -> tuple[tuple[int, ...], str]:
+    graph, tolerance, free = solution.graph, solution.tolerance, list(solution.model.resolved.free)
+    if not free:
+        return (), ""
+    if isinstance(tie_break, Ends):
+        start = np.zeros(len(free)) if solution.model.resolved.done else tie_break.start[free]
+        return graph.by_ends(start, tie_break.end[free], tolerance), ""
+    candidates = graph.members(tolerance, TIE_CAP if tie_break else 1)
+    if tie_break is None:
+        return candidates[0], ""
+    more = f" Ties settled among {len(candidates):,} of {ties:,} equal sequences." if ties > len(candidates) else ""
+    return min(candidates, key=lambda s: (tie_break(solution.named(s)), s)), more
 
 
-def lowest_orders(solution: Solution, cap: int) -> list[tuple[int, ...]]:
-    """Cheapest sequences, lowest ids first, at most `cap`."""
-    to_go = solution.to_go[:, None]
-    slack = np.array([solution.tolerance])
-    found, _ = kernels.members_within(
-        solution.table[:, :, None], solution.n, solution.to_go[:1], to_go, np.full_like(to_go, np.inf), slack, cap
-    )
-    return [tuple(int(a) for a in row) for row in found]
-
-
-def one_per_ends(solution: Solution) -> list[tuple[int, ...]]:
-    """For each pair of first and last region of a cheapest sequence, the one with the lowest ids."""
-    last = kernels.last_regions(solution.table, solution.to_go, solution.n, solution.tolerance)
-    ends = ((a, b) for a in range(solution.n) if _tied(solution, 0, a) for b in range(solution.n) if last[1 << a] >> b & 1)
-    return [_between(solution, last, a, b) for a, b in ends]
-
-
-def _tied(solution: Solution, state: int, a: int) -> bool:
-    after = state | 1 << a
-    return after != state and solution.table[state, a] + solution.to_go[after] <= solution.to_go[state] + solution.tolerance
-
-
-def _between(solution: Solution, last: NDArray[np.int64], first: int, end: int) -> tuple[int, ...]:
-    full = (1 << solution.n) - 1
-    order, state = [first], 1 << first
-    while state != full:
-        a = next(
-            a
-            for a in range(solution.n)
-            if _tied(solution, state, a) and (a == end if state | 1 << a == full else last[state | 1 << a] >> end & 1)
-        )
-        order.append(a)
-        state |= 1 << a
+def _walk(solution: Solution) -> tuple[int, ...]:
+    """A cheapest sequence by the costs-to-go alone."""
+    n, state, order, costs = solution.model.n, 0, list[int](), np.empty(solution.model.n)
+    by_last = len(solution.after) > 0
+    for _ in range(n):
+        step_costs(solution.form, state, costs)
+        key = np.array([(state | 1 << a) * (n if by_last else 1) + (a if by_last else 0) for a in range(n)])
+        add = solution.after[order[-1] if order else n] if by_last else 0.0
+        order.append(int(np.argmin(costs + add + solution.v[key])))
+        state |= 1 << order[-1]
     return tuple(order)
+
+
+@dataclass(frozen=True)
+class Completion:
+    """The best that can follow a start."""
+
+    sequence: tuple[int, ...]  # the whole order, the given start first
+    spent: float  # cost of the start
+    rest: float  # cheapest cost of what follows
+    proved: bool
+
+    @property
+    def cost(self) -> float:
+        return self.spent + self.rest
+
+
+def best_completion(problem: SequencingProblem, w: Array, prefix: tuple[int, ...], constraints: Constraints | None = None) -> Completion:
+    """If the expert starts so: the cheapest way to go on.
+
+    Raises:
+        ContradictoryConstraints: The start breaks the constraints already.
+    """
+    begun = replace(constraints or Constraints(), done=tuple(prefix))
+    found = shortest_sequence(problem, w, None, begun)
+    spent = problem.cost_of(w, found.sequence[: len(prefix)])
+    return Completion(found.sequence, spent, found.cost - spent, found.proved)

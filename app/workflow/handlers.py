@@ -4,7 +4,7 @@ from app.jobs.dispatcher import Jobs
 from app.workflow import import_job, playback_job, training_job
 from app.workflow.values import Values
 
-WARM_UP = ("app.sequencing.kernels.warm_up", "app.geometry.regions.warm_up")
+WARM_UP = ("app.sequencing.warming.warm_up", "app.geometry.regions.warm_up")
 
 
 def register(jobs: Jobs, values: Values) -> None:

@@ -3,6 +3,7 @@
 import math
 import time
 from collections.abc import Callable
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from sqlmodel import Session, col, select
 from app.learning.effort_features import EFFORT_COLUMNS
 from app.learning.policy import Policy
 from app.learning.prediction import Prediction, predict
+from app.sequencing.constraints import Constraints, resolve
 from app.sequencing.features import FEATURE_SETS, Feature, interaction_column
 from app.sequencing.problem import SequencingProblem, check_sequence
 from app.sequencing.shortest import gap_between
@@ -48,15 +50,17 @@ def policy_value(row: PolicyRow) -> Policy:
     return Policy(np.array(row.weights), row.feature_set, row.feature_version, interactions, effort, tuple(row.identifiable))
 
 
-def make_plan(ctx: Context, policy_id: str, tool_id: str) -> Json:
+def make_plan(ctx: Context, policy_id: str, tool_id: str, constraints: Constraints | None = None) -> Json:
     """The lowest-cost sequence for a tool, computed now.
 
     Raises:
+        ContradictoryConstraints: The constraints on the order can't hold together; names them.
         StalePolicy: The tool has another feature set than the policy was learned with.
     """
-    cut_id, problem, policy_of_plan = ctx.store.read(lambda session: _to_predict(ctx, session, policy_id, tool_id))
+    cut_id, problem, policy_of_plan, names = ctx.store.read(lambda session: _to_predict(ctx, session, policy_id, tool_id))
+    resolve(constraints, problem.n, names)  # refused in the names the user gave
     started = time.perf_counter()
-    prediction = predict(problem, policy_of_plan, _deadline(BOUND_SECONDS))
+    prediction = predict(problem, policy_of_plan, _deadline(BOUND_SECONDS), constraints)
     milliseconds = 1000 * (time.perf_counter() - started)
 
     def change(session: Session) -> Json:
@@ -68,7 +72,7 @@ def make_plan(ctx: Context, policy_id: str, tool_id: str) -> Json:
             tool_id=tool_id,
             segmentation_id=cut_id,
             sequence=[int(a) for a in prediction.sequence],
-            result=_result(prediction, milliseconds),
+            result=_result(prediction, milliseconds) | {"constraints": asdict(constraints) if constraints else None},
         )
         session.add(row)
         session.flush()
@@ -107,7 +111,7 @@ def what_if(ctx: Context, plan_id: str, sequence: list[int]) -> Json:
         order = check_sequence(sequence, cut.region_count)
         policy = policy_value(found(session, PolicyRow, row.policy_id, "policy"))
         problem = ctx.values.problem(session, cut, policy.interactions)
-        parts = policy.weights * (problem.feature_sum(order) - problem.feature_sum(tuple(row.sequence)))
+        parts = policy.weights * (problem.feature_sum(order) - problem.steps_of(row.sequence).sum(axis=0))
         delta = float(parts.sum())
         features = [{"label": column.label, "delta": float(part)} for column, part in zip(problem.columns, parts, strict=True)]
         return {"cost": row.result["cost"] + delta, "delta": delta, "features": features}
@@ -153,6 +157,7 @@ def plan_json(ctx: Context, session: Session, row: Plan) -> Json:
         "sequence": row.sequence,
         **{key: row.result[key] for key in ("cost", "ties", "proved", "method", "effort", "tie_settled_by", "milliseconds")},
         **_sureness(row.result),
+        "constraints": row.result.get("constraints"),
         "orders": f"{math.factorial(len(row.sequence)):,}",
         "features": [{"key": c.key, "label": c.label, "symbol": c.symbol} for c in _columns(policy)],
         "steps": [
@@ -192,13 +197,14 @@ def sureness_words(cost: float, proved: bool, bound: float | None) -> str:
     return f"Best found, at most {cost - bound:.3g} above the optimum"
 
 
-def _to_predict(ctx: Context, session: Session, policy_id: str, tool_id: str) -> tuple[str, SequencingProblem, Policy]:
+def _to_predict(ctx: Context, session: Session, policy_id: str, tool_id: str) -> tuple[str, SequencingProblem, Policy, list[str]]:
     policy = found(session, PolicyRow, policy_id, "policy")
     cut = ready_segmentation(session, present(session, ToolRow, tool_id))
     same = cut.feature_set == policy.feature_set
     # another feature set: `predict` refuses it in words
     problem = ctx.values.problem(session, cut, interactions_from(policy.interactions) if same else ())
-    return cut.id, problem, policy_value(policy)
+    names = [region.name for region in ctx.values.tool(session, cut).regions]
+    return cut.id, problem, policy_value(policy), names
 
 
 def _deadline(seconds: float) -> Callable[[], bool]:

@@ -126,6 +126,14 @@ def test_teaching_to_the_robot(api: Api, sample: dict[str, Any]) -> None:
     assert other["delta"] == pytest.approx(other["cost"] - plan["cost"])
     assert api.get(f"/policies/{policy['id']}/plans")["items"][0]["id"] == plan["id"]
 
+    asked = {"tool_id": tool["id"], "constraints": {"first": plan["sequence"][-1]}}
+    turned = api.post(f"/policies/{policy['id']}/plans", asked)
+    assert turned["sequence"][0] == plan["sequence"][-1]
+    assert turned["constraints"]["first"] == plan["sequence"][-1]
+    assert turned["cost"] >= plan["cost"] - 1e-9
+    refused = {"tool_id": tool["id"], "constraints": {"before": [[[0], [1]], [[1], [0]]]}}
+    assert "No order can have" in api.post(f"/policies/{policy['id']}/plans", refused, status=422)["detail"]
+
     playback = api.post(f"/plans/{plan['id']}/playbacks", {}, status=202)
     playback = api.until(f"/playbacks/{playback['id']}", lambda row: row["state"] in ("ready", "failed"), seconds=200)
     assert playback["state"] == "ready", playback

@@ -6,11 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.geometry.tool import GraphSource
-from app.sequencing import kernels
+from app.sequencing import block, exact, forms, gaps, kernels, nearly, warming
+from app.sequencing.classes import equivalent_sequences
 from app.sequencing.comparison import kendall_tau
 from app.sequencing.large import best_found
 from app.sequencing.problem import problem_for
-from app.sequencing.shortest import TIE_CAP, cost_to_go, shortest_sequence
+from app.sequencing.shortest import TIE_CAP, Ends, cost_to_go, shortest_sequence
 from tests.sequencing.graphs import every_order, grid_graph
 
 shapes = st.sampled_from([(1, 1), (1, 3), (2, 2), (1, 5), (2, 3), (1, 7)])
@@ -56,10 +57,11 @@ def test_tie_break_looks_at_the_whole_class():
 def test_tie_break_on_the_ends_is_exact_in_a_huge_class():
     """With all weights zero every one of 9! orders ties; the penalty wants to start at 7 and end at 2."""
     problem = problem_for(grid_graph(3, 3, 1))
-    found = shortest_sequence(problem, np.zeros(13), lambda s: float(s[0] != 7) + float(s[-1] != 2))
+    found = shortest_sequence(problem, np.zeros(13), Ends(1.0 - np.eye(9)[7], 1.0 - np.eye(9)[2]))
     assert found.ties == 362_880 > TIE_CAP
     assert found.sequence == (7, 0, 1, 3, 4, 5, 6, 8, 2)
-    assert "of 362,880 equal sequences" in found.method
+    called = shortest_sequence(problem, np.zeros(13), lambda s: float(s[0] != 7))
+    assert "among 2,000 of 362,880 equal sequences" in called.method
 
 
 def test_twenty_regions_are_proved_and_better_than_any_descent():
@@ -71,13 +73,13 @@ def test_twenty_regions_are_proved_and_better_than_any_descent():
 
 
 def test_large_tools_are_not_called_proved():
-    problem, rng = problem_for(grid_graph(4, 6, 3)), np.random.default_rng(0)
+    problem, rng = problem_for(grid_graph(4, 7, 3)), np.random.default_rng(0)
     w = rng.normal(size=13)
     found = shortest_sequence(problem, w)
     assert not found.proved
-    assert "Not proved" in found.method
+    assert "Not proved optimal: 28 regions are more than the 26" in found.method
     assert found.cost == pytest.approx(problem.cost(w, found.sequence))
-    assert found.cost < min(problem.cost(w, rng.permutation(24)) for _ in range(200))
+    assert found.cost < min(problem.cost(w, rng.permutation(28)) for _ in range(200))
     assert found == shortest_sequence(problem, w)
 
 
@@ -89,7 +91,10 @@ def test_kendall_tau():
 
 
 def test_warm_up_compiles_what_a_search_uses():
-    kernels.warm_up()
-    before = {k: len(k.signatures) for k in (kernels.lowest_to_go, kernels.count_lowest, kernels.members_within, kernels.box_gaps)}
-    shortest_sequence(problem_for(grid_graph(2, 3, 1)), np.ones(13), lambda s: 0.0)
+    used = (block.fill, nearly._explore, nearly._count, forms.weigh, exact.magnitude, kernels.members_within, gaps.box_gaps)
+    warming.warm_up()
+    before = {k: len(k.signatures) for k in used}
+    assert all(before.values())
+    best = shortest_sequence(problem_for(grid_graph(2, 4, 1)), np.ones(13), Ends(np.zeros(8), np.zeros(8)))
+    equivalent_sequences(problem_for(grid_graph(2, 4, 1)), best.sequence)
     assert {k: len(k.signatures) for k in before} == before
