@@ -12,12 +12,12 @@ import { RegionTable } from "./tools-regions.js";
 
 export class ToolPanel {
   // list: the node with all tools, shown here as a tab unless the window is wide enough for a column of its own.
-  constructor({ editor, list, onChanged, onCarried, reload }) {
+  constructor({ editor, list, onChanged, onCut, onCarried, reload }) {
     Object.assign(this, { editor, list, onChanged, reload });
     this.table = new RegionTable(editor, { onRenamed: reload });
     this.history = new History(editor);
     this.old = new OldDemonstrations({ onCarried });
-    this.cut = new CutPanel({ onTool: onChanged });
+    this.cut = new CutPanel({ onTool: onCut });
     this.tabs = h("div.segmented", { role: "group", "aria-label": "What the panel shows" });
     this.export = h("a.icon-btn.push", { "aria-label": "Download the regions as CSV", dataset: { tip: "Download the regions as CSV", key: "csv" }, download: "" }, icon("download"));
     this.body = h("div.fill", { style: { flex: "1" } });

@@ -34,7 +34,7 @@ const toolbar = new Toolbar(editor);
 const tools = h("div.tool-list");
 const list = h("div.fill", { style: { flex: "1" } }, h("div.scroll", {}, tools), uploadExtras());
 const column = h("nav.card.fill", { "aria-label": "Tools" });
-const panel = new ToolPanel({ editor, list, onChanged: (tool) => replaceTool(tool).catch(complain), onCarried: () => load(), reload: () => load().catch(complain) });
+const panel = new ToolPanel({ editor, list, onChanged: (tool) => replaceTool(tool).catch(complain), onCut: (tool) => replaceTool(tool).then(() => editor.select([])).catch(complain), onCarried: () => load(), reload: () => load().catch(complain) });
 const head = h("div.head");
 const cover = h("div.empty", { hidden: true });
 const stage = h("section.stage", { "aria-label": "3D view" }, h("div.tl", {}, toolbar.hint), h("div.bc", {}, toolbar.finish), cover);
@@ -167,11 +167,15 @@ async function discard(tool) {
   } });
 }
 
-async function load(wanted = state.tool?.id) {
+async function load(wanted) {
   state.tools = await all(`/projects/${encodeURIComponent(shell.projectId)}/tools`);
-  const tool = state.tools.find((entry) => entry.id === wanted) ?? state.tools[0];
+  const id = wanted ?? state.tool?.id; // asked after reading: an upload may have opened its tool meanwhile
+  const tool = state.tools.find((entry) => entry.id === id) ?? state.tools[0];
   if (!tool) return showEmpty();
-  if (!body.isConnected) fill(shell.main, head, body, uploads.inputs);
+  if (!body.isConnected) {
+    fill(shell.main, head, body, uploads.inputs);
+    arrange(); // the rows of the uploads come back from the empty page
+  }
   if (!state.view) {
     state.view = new View3D(stage, { projectId: shell.projectId, name: "tools" });
     editor.attach(state.view);
