@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Response
 from pydantic import Field
 
+from app.api.coverage import InteractionChoice
 from app.api.dependencies import Body, Ctx, Json, Name, Paging, Row, Version, page, tagged
 from app.api.idempotency import ActionRoute, IdempotencyKey
 from app.api.projects import NamedInteraction
@@ -24,6 +25,7 @@ class ProcessChanges(Body):
     template: Annotated[Key, Field(description="Key or id of the process template to start from.")] | None = None
     without: Annotated[Keys, Field(description="Features switched off.")] | None = None
     own: Annotated[Keys, Field(description="Own features switched on, by KEY.")] | None = None
+    interactions: Annotated[list[InteractionChoice], Field(max_length=20)] | None = None
     levels: Annotated[Levels, Field(description="Thirds of the values at hand, or of their range.")] | None = None
 
 

@@ -4,7 +4,6 @@ from typing import Any
 
 from sqlmodel import Session
 
-from app.errors import InvalidInput, UnknownFeature
 from app.learning.coverage import RULE, Cell, CoverageReport, InteractionTable
 from app.learning.levels import Levels
 from app.sequencing.features import FeatureSet, interaction_label
@@ -13,7 +12,7 @@ from app.storage.tables import Project, Segmentation, ToolRow
 from app.workflow.context import Context
 from app.workflow.feature_choice import project_features
 from app.workflow.lookup import present, standing
-from app.workflow.project_rows import project_json, touch
+from app.workflow.project_rows import checked_interactions, project_json, touch
 from app.workflow.reports import report_of
 
 Json = dict[str, Any]
@@ -41,18 +40,7 @@ def set_interactions(ctx: Context, project_id: str, interactions: list[dict[str,
     def change(session: Session) -> None:
         project = present(session, Project, project_id)
         features = project_features(session, project_id)
-        seen: set[frozenset[str]] = set()
-        for pair in interactions:
-            for key in (pair["first"], pair["second"]):
-                if key not in features.factors:
-                    raise UnknownFeature(f"There is no feature {key!r}. Known are: {', '.join(sorted(features.factors))}.")
-            both = frozenset((pair["first"], pair["second"]))
-            if len(both) < 2:
-                raise InvalidInput(f"An interaction needs two different features, not {pair['first']} twice.")
-            if both in seen:
-                raise InvalidInput(f"The interaction of {pair['first']} and {pair['second']} is named twice.")
-            seen.add(both)
-        project.interactions = [{"first": pair["first"], "second": pair["second"]} for pair in interactions]
+        project.interactions = checked_interactions(features, interactions)
         touch(session, project)
         emit(session, "coverage.changed", project_id)
 

@@ -17,7 +17,7 @@ from app.storage.tables import OwnFeatureRow, ProcessTemplateRow, Project
 from app.workflow.context import Context
 from app.workflow.feature_choice import FOLDER, base_set, examined, own_features, own_files, project_features
 from app.workflow.lookup import check_version, current_segmentation, found, present, refuse_while_training, tools_of
-from app.workflow.project_rows import checked_name, labelled, touch
+from app.workflow.project_rows import checked_interactions, checked_name, labelled, touch
 
 Json = dict[str, Any]
 
@@ -33,7 +33,8 @@ def set_process(ctx: Context, project_id: str, changes: Json, version: int | Non
     Args:
         ctx: Where.
         project_id: Which.
-        changes: Any of `template` (key or id), `without` (factors), `own` (keys of files in the folder), `levels` ("quantile" | "range").
+        changes: Any of `template` (key or id), `without` (factors), `own` (keys of files in the folder), `levels` ("quantile" | "range"),
+            `interactions` (pairs of factors).
         version: The version the caller has seen.
 
     Raises:
@@ -47,7 +48,7 @@ def set_process(ctx: Context, project_id: str, changes: Json, version: int | Non
         check_version(project, version)
         refuse_while_training(session, project)
         if changes.get("template") is not None:
-            _start_from(session, project, changes["template"])
+            start_from(session, project, changes["template"])
         if changes.get("without") is not None:
             project.without = _checked(session, project, changes["without"])
         if changes.get("own") is not None:
@@ -55,6 +56,8 @@ def set_process(ctx: Context, project_id: str, changes: Json, version: int | Non
         if changes.get("levels") is not None:
             project.levels = {**project.levels, "default": changes["levels"]}
         chosen = project_features(session, project.id)  # refuses an empty or ambiguous choice
+        if changes.get("interactions") is not None:
+            project.interactions = checked_interactions(chosen, changes["interactions"])
         project.interactions = [i for i in project.interactions if {i["first"], i["second"]} <= chosen.factors.keys()]
         touch(session, project)
         emit(session, "coverage.changed", project.id)
@@ -147,7 +150,7 @@ def _saved(session: Session, template_id: str) -> ProcessTemplateRow:
     return row
 
 
-def _start_from(session: Session, project: Project, key: str) -> None:
+def start_from(session: Session, project: Project, key: str) -> None:
     """Take over a template as far as the project's features go."""
     factors = FEATURE_SETS[base_set(session, project.id)].factors
     built_in = template_of(key)

@@ -4,7 +4,7 @@ from typing import Any
 
 from sqlmodel import Session, col, func, select
 
-from app.errors import InvalidInput
+from app.errors import InvalidInput, UnknownFeature
 from app.jobs.rows import running_jobs
 from app.sequencing.features import DEFAULT_INTERACTIONS, FACTOR_WORDS, FeatureSet, Interaction, interaction_label
 from app.storage import emit
@@ -21,7 +21,7 @@ Json = dict[str, Any]
 
 def add_project(session: Session, name: str, process: str, *, sample: bool = False) -> Project:
     """The row of a new project."""
-    row = Project(name=checked_name(name), process=process, sample=sample, interactions=stored(DEFAULT_INTERACTIONS))
+    row = Project(name=checked_name(name), process=process, template="layup", sample=sample, interactions=stored(DEFAULT_INTERACTIONS))
     session.add(row)
     session.flush()
     emit(session, "project.changed", row.id)
@@ -50,6 +50,27 @@ def checked_name(name: str) -> str:
 def stored(interactions: tuple[Interaction, ...]) -> list[dict[str, str]]:
     """Interactions as a JSON column holds them."""
     return [{"first": i.first, "second": i.second} for i in interactions]
+
+
+def checked_interactions(features: FeatureSet, interactions: list[dict[str, str]]) -> list[dict[str, str]]:
+    """Interactions as stored.
+
+    Raises:
+        InvalidInput: One is named twice, or pairs a factor with itself.
+        UnknownFeature: A factor that the project's features don't have.
+    """
+    seen: set[frozenset[str]] = set()
+    for pair in interactions:
+        for key in (pair["first"], pair["second"]):
+            if key not in features.factors:
+                raise UnknownFeature(f"There is no feature {key!r}. Known are: {', '.join(sorted(features.factors))}.")
+        both = frozenset((pair["first"], pair["second"]))
+        if len(both) < 2:
+            raise InvalidInput(f"An interaction needs two different features, not {pair['first']} twice.")
+        if both in seen:
+            raise InvalidInput(f"The interaction of {pair['first']} and {pair['second']} is named twice.")
+        seen.add(both)
+    return [{"first": pair["first"], "second": pair["second"]} for pair in interactions]
 
 
 def labelled(interactions: list[dict[str, str]], features: FeatureSet) -> list[Json]:

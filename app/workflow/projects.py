@@ -4,10 +4,12 @@ from typing import Any
 
 from sqlmodel import Session, col, select
 
+from app.learning.process_templates import BUILT_IN
 from app.storage.identity import now
 from app.storage.tables import Project
 from app.workflow.context import Context
 from app.workflow.lookup import check_version, present, refuse_while_training
+from app.workflow.process import start_from
 from app.workflow.project_rows import add_project, checked_name, project_json, touch
 from app.workflow.sample import create_sample
 
@@ -25,8 +27,16 @@ def list_projects(ctx: Context) -> list[Json]:
 
 
 def create_project(ctx: Context, name: str, process: str = "") -> Json:
-    """An empty project with the usual interactions."""
-    project_id = ctx.store.write(lambda session: add_project(session, name, process).id)
+    """An empty project; a process that a built-in template is for starts from it, others from that of layup."""
+
+    def change(session: Session) -> str:
+        row = add_project(session, name, process)
+        template = next((t for t in BUILT_IN if t.name == process), None)
+        if template is not None:
+            start_from(session, row, template.key)
+        return row.id
+
+    project_id = ctx.store.write(change)
     return get_project(ctx, project_id)
 
 

@@ -110,7 +110,7 @@ function paintExample() {
 function paintSuspects() {
   const { interactions, interaction_choices: choices } = shell.project;
   const on = (entry) => interactions.some((other) => other.first === entry.first && other.second === entry.second);
-  fill(parts.suspectBody, h("p.small.muted", {}, "Tick two things that you think act together when you choose the next region."),
+  fill(parts.suspectBody, h("p.small.muted", {}, "Tick two things that you think act together when you choose the next region. ", h("a", { href: pageAddress(shell.projectId, "process") }, "Which features count at all?")),
     choices.map((entry) => h("label.check", {}, h("input", { type: "checkbox", checked: on(entry), dataset: { key: `suspect-${entry.first}-${entry.second}` }, onchange: (event) => suspect(entry, event.target.checked) }), sentence(entry.label))));
 }
 

@@ -13,7 +13,7 @@ import { View3D } from "../view3d.js";
 import { ago, plural, sentence, spoken, timeLeft } from "../words.js";
 
 const DELETE_AFTER_MS = 4200;
-const PROCESSES = ["Composite layup", "Sanding", "Polishing", "Spraying", "Deburring"];
+const PROCESSES = ["Composite layup", "Surface finishing", "Spraying"]; // each has a template; any other word starts from that of layup
 
 const shell = await boot();
 const head = h("div.head");
