@@ -119,5 +119,5 @@ export function readAgain(tool) {
 // What stands below the list of tools: which files can be dropped here, and tables to start from.
 export function uploadExtras() {
   const template = (format) => h("a", { href: `/api/v1/region-table-template?format=${format}`, download: `region-table.${format}`, dataset: { key: `template-${format}` } }, format.toUpperCase());
-  return h("p.drop-note", {}, "Drop CAD files or region tables anywhere on this page. A table to start from: ", template("csv"), " or ", template("json"), ".");
+  return h("p.drop-note", {}, h("span", {}, "Drop CAD files or region tables anywhere on this page. A table to start from: ", template("csv"), " or ", template("json"), "."));
 }
