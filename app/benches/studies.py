@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from app.benches.plots import Curve, Plot, as_svg
+from app.benches.plots import Curve, Plot, as_svg, bars_as_svg
 from app.learning.ablation import Ablation, ablate
 from app.learning.comparing import (
     Score,
@@ -22,7 +22,7 @@ from app.learning.comparing import (
     synthetic_case,
 )
 from app.learning.coverage_study import format_coverage, study_coverage
-from app.learning.effort_study import study_effort
+from app.learning.effort_study import SideResult, study_effort
 from app.learning.evaluation import TRAINED_ON, Kind, read_tables, recorded_in
 from app.learning.expert import ScriptedExpert
 from app.learning.performance_state import LearningDemonstration
@@ -112,11 +112,14 @@ def effort(data: Path, out: Path | None, say: Say) -> None:
         seen, new = (f"{t.before} -> {t.after} of {t.tools}" for t in (r.trained, r.unseen))
         say(f"{r.preference:14s}  {r.answers:7d}   {seen:>14s}   {new:>12s}")
     _save(out, "effort.json", found)
-    x = np.arange(1.0, len(found) + 1)
-    both = [[(getattr(t, at), t.tools) for r in found for t in (r.trained, r.unseen)] for at in ("before", "after")]
-    share = [np.array([100 * (a + b) / max(m + n, 1) for (a, m), (b, n) in zip(s[::2], s[1::2], strict=True)]) for s in both]
-    curves = (Curve("before", x, share[0]), Curve("after", x, share[1]))
-    _write(out, "effort.svg", as_svg(Plot("Chosen order has the least effort, all tools", "Preference, as listed", "% of tools", curves)))
+    shares = {at: np.array([100 * _share(r, at) for r in found]) for at in ("before", "after")}
+    labels = tuple(r.preference for r in found)
+    _write(out, "effort.svg", bars_as_svg("Chosen order has the least effort", "% of all tools it makes a difference on", labels, shares))
+
+
+def _share(result: SideResult, at: str) -> float:
+    both = (result.trained, result.unseen)
+    return sum(getattr(t, at) for t in both) / max(sum(t.tools for t in both), 1)
 
 
 def _save(out: Path | None, name: str, value: Any) -> None:

@@ -5,7 +5,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from app.benches.plots import HEIGHT, LEFT, Curve, Plot, as_svg, ticks
+from app.benches.plots import BOTTOM, HEIGHT, LEFT, Curve, Plot, as_svg, bars_as_svg, ticks
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -36,3 +36,13 @@ def test_curve_band_and_words():
     assert all(0 <= y <= HEIGHT for _, y in points)
     words = [t.text for t in root.iter(f"{SVG}text")]
     assert {"Spread & shift", "Update", "Cost", "all <terms>"} <= set(words)
+
+
+def test_bars_are_as_tall_as_their_values():
+    root = ET.fromstring(bars_as_svg("Sides", "%", ("left", "right"), {"before": np.array([50.0, 0.0]), "after": np.array([100.0, 100.0])}))
+    bars = root.findall(f"{SVG}rect")[1:]
+    heights = [float(b.attrib["height"]) for b in bars]
+    assert heights[0] == pytest.approx(heights[2] / 2, abs=0.2)
+    assert heights[1] < 1
+    assert all(float(b.attrib["y"]) + float(b.attrib["height"]) == pytest.approx(HEIGHT - BOTTOM, abs=0.2) for b in bars)
+    assert {"left", "right", "before", "after"} <= {t.text for t in root.iter(f"{SVG}text")}
