@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.geometry.carry_over import map_regions
 from app.geometry.cleaning import areas, face_pairs
@@ -12,10 +13,11 @@ from app.geometry.importing import ImportedPart
 from app.geometry.merge_tree import MergeTree
 from app.geometry.pieces import tree_for
 from app.geometry.regions import measure, measure_labelled
-from app.geometry.segmentation import Report, SegmentationParameters, ignore, segment
+from app.geometry.segmentation import MOST_TARGET, Report, SegmentationParameters, ignore, segment
 from app.geometry.splitting import connected
 from app.geometry.tool import Tool, region_letters
 
+ROUNDS = 3  # of cutting more finely around locked regions
 LETTERS = 702  # A to ZZ: names nobody gave
 SCRAP = 0.01  # share of the working surface below which what is left of a new region beside a locked one goes to a neighbour
 
@@ -74,18 +76,32 @@ def recut_around(
         The tool, and the numbers the locked regions have in it: the first ones.
     """
     here = replace(part, mesh=tool.mesh, cad_face=np.full(len(tool.mesh.faces), -1, np.int32))
-    cut = segment(here, parameters, tree=tree)
+    made, labels = _cut_beside(here, tool, locked, parameters, tree)
+    for _ in range(ROUNDS):  # part of the regions asked for lies where the locked ones are; then more are needed
+        wanted, found = (parameters.target or 0) - len(locked), int(labels.max()) + 1 - len(locked)
+        if parameters.target is None or found >= wanted or parameters.target == MOST_TARGET:
+            break
+        parameters = replace(parameters, target=min(MOST_TARGET, -(-parameters.target * wanted // max(found, 1))))
+        made, labels = _cut_beside(here, tool, locked, parameters, tree)
+    kept = [tool.regions[a].name for a in sorted(locked)]
+    count = int(labels.max()) + 1
+    free = [name for name in region_letters(count + len(kept)) if name not in kept]
+    names = [*kept, *free[: count - len(kept)]]
+    return measure_labelled(made.mesh, labels, names), tuple(range(len(kept)))
+
+
+def _cut_beside(
+    part: ImportedPart, tool: Tool, locked: Sequence[int], parameters: SegmentationParameters, tree: MergeTree
+) -> tuple[ImportedPart, NDArray[np.int32]]:
+    """The part with the locked regions of the tool as labels 0, 1, ... and the new ones behind them."""
+    cut = segment(part, parameters, tree=tree)
     before = tool.labels[cut.source]
     held = np.isin(before, list(locked))
     labels = np.where(cut.labels >= 0, cut.labels + len(locked), -1).astype(np.int64)
     labels[held] = np.searchsorted(sorted(locked), before[held])
     labels = _without_scraps(cut.part, labels, len(locked))
     present = np.unique(labels[labels >= 0])
-    compact = np.where(labels >= 0, np.searchsorted(present, labels), -1).astype(np.int32)
-    kept = [tool.regions[a].name for a in sorted(locked)]
-    free = [name for name in region_letters(len(present) + len(kept)) if name not in kept]
-    names = [*kept, *free[: len(present) - len(kept)]]
-    return measure_labelled(cut.part.mesh, compact, names), tuple(range(len(kept)))
+    return cut.part, np.where(labels >= 0, np.searchsorted(present, labels), -1).astype(np.int32)
 
 
 def _without_scraps(part: ImportedPart, labels: np.ndarray, locked: int) -> np.ndarray:
