@@ -126,7 +126,7 @@ def plain(value: object) -> object:
 
 @app.command()
 def bench(
-    name: Annotated[Literal["sequencing", "learning"], typer.Argument(help="What to measure.")],
+    name: Annotated[Literal["sequencing", "learning", "geometry"], typer.Argument(help="What to measure.")],
     data: Annotated[Path | None, typer.Option(exists=True, file_okay=False, help="Folder with the authors' tables.")] = None,
     cad: Annotated[Path | None, typer.Option(exists=True, file_okay=False, help="Folder with CAD files.")] = None,
     checkout: Annotated[Path | None, typer.Option(exists=True, file_okay=False, help="Checkout of the authors' code, for ratios.")] = None,

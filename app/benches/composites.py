@@ -159,3 +159,25 @@ def rand_index(a: NDArray[np.integer], b: NDArray[np.integer], weight: Array) ->
     both, rows, columns = (table**2).sum(), (table.sum(1) ** 2).sum(), (table.sum(0) ** 2).sum()
     most = (rows + columns) / 2
     return 1.0 if most == rows * columns else float((both - rows * columns) / (most - rows * columns))
+
+
+def freeform(faces: int, rng: np.random.Generator) -> Composite:
+    """Four patches side by side that no plane, sphere or cylinder fits: a saddle, a bump, a twisted strip and a wave; creases between."""
+    count = max(6, int(np.sqrt(faces / 2) / 2))
+    u = np.linspace(0, 4, 4 * count + 1)
+    band = np.repeat(np.arange(4), count).astype(np.int32)
+
+    def at(s: Array, t: Array) -> Array:
+        k = np.clip(s.astype(int), 0, 3)
+        w, v = s - k, t
+        lift = 4 * w * (1 - w)  # 0 on the common borders, so the patches meet
+        heights = [
+            0.3 * lift * (v - 0.5) ** 2 * 4,
+            0.45 * lift * (1 - 0.6 * (2 * v - 1) ** 2),
+            0.5 * lift * (v - 0.5),
+            -0.35 * lift * (1 + 0.4 * np.sin(3 * v)),
+        ]
+        return np.stack([s, 2 * v, np.choose(k, heights)], axis=1) * 0.2
+
+    mesh, truth = patch_grid(at, u, np.linspace(0, 1, int(faces / 2 / (4 * count)) + 1), band, _columns(u, band), rng)
+    return Composite("freeform", mesh, truth, (np.nan,) * 4, ("freeform",) * 4)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.errors import InvalidInput, UnreadableMesh
-from app.geometry.cleaning import face_pairs
+from app.geometry.cleaning import areas, face_pairs
 from app.geometry.denoise import denoised
 from app.geometry.fitting import AREA, NORMAL_WEIGHT, PLANE, PRODUCT, SIZE, face_sums
 from app.geometry.importing import ImportedPart
@@ -120,9 +120,14 @@ def _check(parameters: SegmentationParameters) -> None:
 
 
 def unit_sums(mesh: Mesh) -> Array:
-    """Sums per face in centred coordinates of unit diagonal: a far origin would eat the digits of the fourth powers."""
-    middle = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
-    return face_sums((mesh.vertices - middle) / np.linalg.norm(np.ptp(mesh.vertices, axis=0)), mesh.faces)
+    """Sums per face in coordinates centred on the part, in which it is about one diagonal large.
+
+    A far origin would eat the digits of the fourth powers; the box's own diagonal would change when the part is turned.
+    """
+    corners, area = mesh.vertices[mesh.faces], areas(mesh.vertices, mesh.faces)
+    middle = np.average(corners.mean(axis=1), axis=0, weights=area)
+    spread = np.average(((corners - middle) ** 2).sum(axis=2).mean(axis=1), weights=area)
+    return face_sums((mesh.vertices - middle) / np.sqrt(12 * spread), mesh.faces)
 
 
 def _add_up(sums: Array, label: NDArray[np.integer]) -> Array:
