@@ -16,9 +16,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.optimize import linprog, nnls
+from scipy.optimize import linprog
 
 from app.errors import EmptySample
+from app.learning.effort_choice import candidates
 from app.learning.effort_features import EFFORT_COLUMNS, effort_features, effort_penalty
 from app.learning.performance_state import LearningDemonstration
 from app.learning.qp import Array, QuadraticProgram, solve
@@ -29,7 +30,6 @@ __all__ = ["EFFORT_WORDS", "EffortParameters", "EffortState", "EffortStepResult"
 
 SAME = 1e-9  # places this close are the same
 NOISE = 1e-4  # weights this small against the largest are what the solver leaves of zero
-UNDECIDED = 1e-3  # a pair this far (as a share) outside the cone of known answers is open
 
 Demonstrations = list[LearningDemonstration]
 Answers = Mapping[str, str]  # fingerprint -> "left" | "right" | "equal" | "cant_tell"
@@ -41,9 +41,10 @@ class EffortParameters:
 
     margin: float = 0.1  # epsilon: how much less effort the preferred sequence has
     regularisation: float = 0.05  # lambda
-    batch: int = 2  # questions asked at a time
+    batch: int = 1  # questions asked at a time
     most: int = 12  # questions asked at all
     cap: int = 256  # equivalent sequences looked at per tool
+    pooled: bool = False  # as printed: one threshold for all tools, instead of comparing within a tool
 
 
 EFFORT_WORDS: dict[str, tuple[str, str]] = {
@@ -131,7 +132,7 @@ def effort_step(demonstrations: Demonstrations, parameters: EffortParameters, st
         New state, questions or effort weights, and the answers that contradict each other.
     """
     known = [_Answered.of(demonstrations, q, answers[q.fingerprint]) for q in state.asked if q.fingerprint in answers]
-    weights = _fit(known, parameters)
+    weights = _fit_answers(known, parameters)
     unanswered = tuple(q for q in state.asked if q.fingerprint not in answers)
     if unanswered:
         return EffortStepResult(state, "questions", unanswered, weights, f"Waiting for {_count(len(unanswered), 'answer')}.")
@@ -153,11 +154,13 @@ class _Answered:
     fingerprint: str
     difference: Array  # (8,)
     value: str
+    left: Array  # (8,) z of the left sequence
 
     @staticmethod
     def of(demonstrations: Demonstrations, question: PreferenceQuestion, value: str) -> "_Answered":
         problem = demonstrations[question.demonstration].problem
-        return _Answered(question.fingerprint, effort_features(problem, question.right) - effort_features(problem, question.left), value)
+        left, right = effort_features(problem, question.left), effort_features(problem, question.right)
+        return _Answered(question.fingerprint, right - left, value, left)
 
     @property
     def towards(self) -> Array | None:
@@ -181,8 +184,44 @@ def _fit(known: list[_Answered], parameters: EffortParameters) -> Array:
     limits = np.r_[np.full(len(strict), -parameters.margin), np.full(len(level), parameters.margin / 2), np.zeros(m + wide)]
     curvature = np.r_[np.full(wide, parameters.regularisation), np.zeros(m)]
     program = QuadraticProgram(curvature, np.r_[np.zeros(wide), np.ones(m)], rows, limits)
-    weights = np.maximum(solve(program)[:wide], 0.0)
-    return np.where(weights < NOISE * weights.max(), 0.0, weights)
+    return _clean(solve(program)[:wide])
+
+
+def _clean(weights: Array) -> Array:
+    weights = np.maximum(weights, 0.0)
+    return np.where(weights < NOISE * weights.max(initial=0.0), 0.0, weights)
+
+
+def fit_pooled(preferred: Array, others: Array, parameters: EffortParameters) -> Array:
+    """Eq. 8 as printed: every preferred sequence (p, 8) of any tool at most t, every other one (q, 8) at least t + margin.
+
+    min lambda/2 |w|^2 + sum slack over the others, w >= 0, t free.
+
+    Paper: this compares sequences of different tools, which no expert was asked to do; `EffortParameters.pooled` turns it on.
+    """
+    if not len(others):
+        return np.zeros(len(EFFORT_COLUMNS))
+    wide, p, q = len(EFFORT_COLUMNS), len(preferred), len(others)
+    rows = np.zeros((p + 2 * q + wide, wide + 1 + q))
+    rows[:p, :wide], rows[:p, wide] = preferred, -1.0
+    rows[p : p + q, :wide], rows[p : p + q, wide], rows[p : p + q, wide + 1 :] = -others, 1.0, -np.eye(q)
+    rows[p + q : p + 2 * q, wide + 1 :] = -np.eye(q)
+    rows[p + 2 * q :, :wide] = -np.eye(wide)
+    limits = np.r_[np.zeros(p), np.full(q, -parameters.margin), np.zeros(q + wide)]
+    curvature = np.r_[np.full(wide, parameters.regularisation), np.zeros(1 + q)]
+    return _clean(solve(QuadraticProgram(curvature, np.r_[np.zeros(wide + 1), np.ones(q)], rows, limits))[:wide])
+
+
+def _fit_answers(known: list[_Answered], parameters: EffortParameters) -> Array:
+    """Weights from the answers, compared within a tool or pooled."""
+    if not parameters.pooled:
+        return _fit(known, parameters)
+    sides = [
+        (a.left, a.left + a.difference) if a.value == "left" else (a.left + a.difference, a.left) for a in known if a.towards is not None
+    ]
+    wide = len(EFFORT_COLUMNS)
+    better, worse = (np.array([pair[k] for pair in sides]).reshape(-1, wide) for k in (0, 1))
+    return fit_pooled(better, worse, parameters)
 
 
 def _possible(known: list[_Answered]) -> bool:
@@ -219,45 +258,13 @@ def _smallest_conflict(known: list[_Answered]) -> tuple[str, ...]:
 def _next_questions(
     demonstrations: Demonstrations, parameters: EffortParameters, state: EffortState, known: list[_Answered]
 ) -> tuple[PreferenceQuestion, ...]:
-    """The pairs (demonstrated, equivalent) farthest from being implied by the answers so far, at most one per direction."""
+    """The pairs of equivalent sequences the answers so far leave most open, at most one per direction."""
     room = min(parameters.batch, parameters.most - len(state.asked))
-    cone = _cone(known)
-    seen = [a.difference for a in known]
-    found: list[PreferenceQuestion] = []
-    while len(found) < room:
-        best: tuple[float, int, Sequence, Array] | None = None
-        for i, d in enumerate(demonstrations):
-            own = effort_features(d.problem, state.choices[i][0])
-            for candidate in state.choices[i][1:]:
-                difference = effort_features(d.problem, candidate) - own
-                open_by = min(_outside(cone, difference), _outside(cone, -difference))
-                if any(_parallel(difference, s) for s in seen) or open_by < UNDECIDED:
-                    continue
-                worth = open_by * float(np.linalg.norm(difference))
-                if best is None or worth > best[0] + SAME:
-                    best = (worth, i, candidate, difference)
-        if best is None:
-            break
-        _, i, candidate, difference = best
-        seen.append(difference)
-        found.append(_question(i, state.choices[i][0], candidate))
-    return tuple(found)
-
-
-def _cone(known: list[_Answered]) -> Array:
-    """(8, k) columns whose non-negative combinations are the differences already decided in favour of 'left'."""
-    rows = [a.towards for a in known if a.towards is not None]
-    rows += [sign * a.difference for a in known if a.value == "equal" for sign in (1.0, -1.0)]
-    return np.array([*rows, *np.eye(len(EFFORT_COLUMNS))]).T
-
-
-def _outside(cone: Array, difference: Array) -> float:
-    """Distance of a direction from the cone, as a share of its length."""
-    return float(nnls(cone, difference / np.linalg.norm(difference))[1])
-
-
-def _parallel(a: Array, b: Array) -> bool:
-    return abs(float(a @ b)) > (1 - SAME) * float(np.linalg.norm(a) * np.linalg.norm(b))
+    places = [np.array([effort_features(d.problem, s) for s in own]) for d, own in zip(demonstrations, state.choices, strict=True)]
+    strict = [a.towards for a in known if a.towards is not None]
+    level = [a.difference for a in known if a.value == "equal"]
+    found = candidates(places, strict, level, [a.difference for a in known], state.seed + len(state.asked))
+    return tuple(_question(c.tool, state.choices[c.tool][c.left], state.choices[c.tool][c.right]) for c in found[: max(room, 0)])
 
 
 def _question(i: int, left: Sequence, right: Sequence) -> PreferenceQuestion:

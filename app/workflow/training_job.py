@@ -4,6 +4,7 @@ Each step is a pure function of checkpoint and answers, and is stored in one tra
 run's new state and the next job. So the same seed and answers give the same weights bit for bit, whenever it is interrupted.
 """
 
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -12,13 +13,15 @@ from sqlmodel import Session, col, select
 from app.jobs.dispatcher import Handler
 from app.jobs.rows import add_job
 from app.learning.differences import PAIR, describe_difference
+from app.learning.effort import EffortParameters
 from app.learning.performance import LearningDemonstration
 from app.learning.performance_conflict import contradiction_words
 from app.storage import emit
 from app.storage.tables import Demonstration, JobRow, Metric, PolicyRow, Query, Run, RunCheckpoint, RunDemonstration, Segmentation, ToolRow
+from app.workflow.feature_choice import stored_features
 from app.workflow.lookup import current_segmentation, found, same_regions
 from app.workflow.run_rows import TRAINING_JOB, checkpoint_of, current_answer, go, learner, parameters_for, write_policy
-from app.workflow.training_step import Asked, Outcome, Step, compute
+from app.workflow.training_step import Asked, Outcome, Parameters, Step, compute
 from app.workflow.values import Values, interactions_from
 
 Json = dict[str, Any]
@@ -44,11 +47,12 @@ def prepare(values: Values, session: Session, job: JobRow) -> Step | None:
     if row is None or row.state not in ("queued", "training"):
         return None
     interactions = interactions_from(row.interactions)
+    features = stored_features(session, row.features) if row.features else None
     demonstrations, keys = [], []
     for shown in demonstrations_of(session, row.id):
         cut = found(session, Segmentation, shown.segmentation_id, "segmentation")
-        demonstrations.append(LearningDemonstration(values.problem(session, cut, interactions), tuple(shown.sequence)))
-        keys.append((cut.id, interactions))
+        demonstrations.append(LearningDemonstration(values.problem(session, cut, interactions, features), tuple(shown.sequence)))
+        keys.append((cut.id, row.features, interactions))
     checkpoint = checkpoint_of(session, row)
     base = session.get(PolicyRow, row.based_on) if row.based_on else None
     cuts = [found(session, Segmentation, key, "segmentation") for key in row.interest]
@@ -57,15 +61,21 @@ def prepare(values: Values, session: Session, job: JobRow) -> Step | None:
         kind=row.kind,
         keys=tuple(keys),
         demonstrations=tuple(demonstrations),
-        parameters=parameters_for(learner(row), row.params),
+        parameters=_parameters(row),
         seed=row.seed,
         state=checkpoint.state if checkpoint else None,
         answers=_answers(session, row.id),
         base=tuple(base.weights) if base else (),
-        tools=tuple(values.problem(session, cut, interactions) for cut in cuts),
-        tool_keys=tuple((cut.id, interactions) for cut in cuts),
+        tools=tuple(values.problem(session, cut, interactions, features) for cut in cuts),
+        tool_keys=tuple((cut.id, row.features, interactions) for cut in cuts),
         gone=frozenset(k for k, cut in enumerate(cuts) if _is_gone(session, cut)),
     )
+
+
+def _parameters(row: Run) -> Parameters:
+    """As a person set them; an effort run in the paper's mode compares sequences of all tools with one threshold."""
+    given = parameters_for(learner(row), row.params)
+    return replace(given, pooled=row.mode == "paper") if isinstance(given, EffortParameters) else given
 
 
 def _is_gone(session: Session, cut: Segmentation) -> bool:

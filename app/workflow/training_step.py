@@ -23,6 +23,7 @@ from app.sequencing.problem import SequencingProblem
 from app.workflow.values import Kept
 
 Json = dict[str, Any]
+Parameters = PerformanceParameters | CertifiedParameters | EffortParameters
 MetricRow = tuple[int, float, dict[str, float], int]
 
 CHUNK = 25  # iterations per job: a few seconds at most between two checkpoints
@@ -38,7 +39,7 @@ class Step:
     kind: str
     keys: tuple[tuple[Any, ...], ...]  # of the problems, to recognise them
     demonstrations: tuple[LearningDemonstration, ...]
-    parameters: PerformanceParameters | CertifiedParameters | EffortParameters
+    parameters: Parameters
     seed: int
     state: Json | None  # None: start
     answers: dict[str, str]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.errors import EmptySample
-from app.learning.effort import EffortParameters, EffortState, _Answered, _fit, _smallest_conflict, effort_step, start_effort
+from app.learning.effort import EffortParameters, EffortState, _Answered, _fit, _smallest_conflict, effort_step, fit_pooled, start_effort
 from app.learning.effort_features import EFFORT_COLUMNS, effort_features, effort_penalty
 from app.learning.expert import ScriptedExpert
 from app.learning.performance import LearningDemonstration
@@ -97,7 +97,7 @@ def test_equal_and_cant_tell_are_not_asked_again(demos):
 
 
 def row(name, difference, value="left"):
-    return _Answered(name, np.array([*difference, *[0.0] * (8 - len(difference))]), value)
+    return _Answered(name, np.array([*difference, *[0.0] * (8 - len(difference))]), value, np.zeros(8))
 
 
 def test_margin_by_hand():
@@ -142,3 +142,37 @@ def test_contradicting_answers_end_as_infeasible(demos):
 def test_nothing_recorded_is_refused():
     with pytest.raises(EmptySample):
         start_effort([], WEIGHTS, PARAMETERS, 0)
+
+
+@pytest.mark.parametrize("column", range(8))
+def test_a_preferred_side_is_found_in_five_answers(demos, column):
+    """Start or end, any side: after at most five answers every pair of the expert's equally cheap orders is ranked as the expert does."""
+    expert = ScriptedExpert(WEIGHTS, np.eye(8)[column])
+    result, answers = teach(demos, expert, EffortParameters(most=5))
+    assert len(answers) <= 5
+    for d in demos:
+        own = optimal_sequences(d.problem, WEIGHTS).sequences
+        z = np.array([effort_features(d.problem, s) for s in own])
+        gap = (z[:, None] - z[None]) @ np.eye(8)[column]
+        learned = (z[:, None] - z[None]) @ result.effort_weights
+        assert (learned[gap > 1e-9] > 0).all()
+
+
+def test_pooled_threshold_satisfies_the_optimality_conditions():
+    """Eq. 8 as printed: no feasible step lowers the objective, and what can be separated is separated by the margin."""
+    rng, parameters = np.random.default_rng(1), EffortParameters(pooled=True)
+    truth = np.array([2.0, 0, 1, 0, 0, 0.5, 0, 0])
+    z = rng.random((30, 8))
+    eta = z @ truth
+    better, worse = z[eta < np.median(eta) - 0.15], z[eta > np.median(eta) + 0.15]
+    w = fit_pooled(better, worse, parameters)
+    assert (worse @ w).min() - (better @ w).max() >= parameters.margin - 1e-6
+
+    def objective(x):
+        slack = np.maximum(0.0, (better @ x).max() + parameters.margin - worse @ x)
+        return 0.5 * parameters.regularisation * float(x @ x) + float(slack.sum())
+
+    for _ in range(300):
+        step = rng.normal(size=8) * 10 ** rng.uniform(-4, 0)
+        assert objective(np.maximum(w + step, 0.0)) >= objective(w) - 1e-7
+    assert not fit_pooled(better, worse[:0], parameters).any()  # nothing unpreferred: no penalty
