@@ -108,9 +108,8 @@ def _check_stl(file_name: str, data: bytes) -> None:
         raise UnreadableMesh(f"{file_name} is not an STL file: it has {len(data)} bytes and no header.")
     held = (len(data) - STL_HEADER) / STL_TRIANGLE
     if stated == int(held):
-        raise UnreadableMesh(
-            f"{file_name} has {len(data):,} bytes, but its {stated:,} triangles need {STL_HEADER + STL_TRIANGLE * stated:,}. Export it again."
-        )
+        needed = STL_HEADER + STL_TRIANGLE * stated
+        raise UnreadableMesh(f"{file_name} has {len(data):,} bytes, but its {stated:,} triangles need {needed:,}. Export it again.")
     raise UnreadableMesh(
         f"{file_name} says it holds {stated:,} triangles, but its size fits {held:,.0f}. It is damaged or not an STL file; export it again."
     )
