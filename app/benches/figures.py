@@ -34,7 +34,7 @@ class Figure:
         """Whether the bar is met; None without a bar."""
         if self.bar is None:
             return None
-        return self.value <= self.bar if self.sense == "at most" else self.value >= self.bar
+        return bool(self.value <= self.bar if self.sense == "at most" else self.value >= self.bar)
 
     @property
     def ratio(self) -> float | None:

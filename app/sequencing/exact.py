@@ -56,7 +56,9 @@ class Model:
 
 def bytes_needed(problem: SequencingProblem, n: int) -> float:
     """Memory of the tables for n regions still to be ordered: costs-to-go, values of sets, undeclared columns."""
-    declared = compose(declare(problem.graph, problem.features), problem.n, tuple(range(problem.n)), ())
+    if "declared" not in problem.kept:
+        problem.kept["declared"] = compose(declare(problem.graph, problem.features), problem.n, tuple(range(problem.n)), ())
+    declared = problem.kept["declared"]
     missing = set(declared.undeclared)
     factors = [{*problem.features.factors[i.first], *problem.features.factors[i.second]} for i in problem.interactions]
     tables = len(missing) + sum(bool(missing & f) for f in factors)
