@@ -24,6 +24,7 @@ from app.sequencing.boxes import Boxes, boxes_of
 from app.sequencing.constraints import Resolved, resolve
 from app.sequencing.features import declare
 from app.sequencing.intervals import Interval, interval_of, product, weighted
+from app.sequencing.large import between_costs
 from app.sequencing.problem import SequencingProblem
 from app.sequencing.relaxations import cheapest_pairs
 from app.sequencing.structure import MeanStep, Pairwise
@@ -82,6 +83,10 @@ def split(problem: SequencingProblem, w: Array, resolved: Resolved) -> Parts:
                 pass
             case _:
                 fixed += weighted(w[i], known[i])
+    between, first = between_costs(problem, w)
+    way_in = between[np.ix_([*past[-1:], *free], free)]
+    np.fill_diagonal(way_in[len(way_in) - count :], np.inf)
+    fixed += np.minimum(way_in.min(axis=0), np.inf if len(past) else first[free])
     walks, left = walks_of(problem, columns, w[:count_columns], v, known, free, past)
     for j in left:
         fixed += weighted(float(v[j]), product(*_factors(problem, known, j)))

@@ -13,7 +13,8 @@ from app.geometry.tool import Array
 from app.sequencing.relaxations import cheapest_sets
 from app.sequencing.structure import Declaration, Gap
 
-GROUPS = 11  # different coordinates per side of the box; more are joined to this many
+GROUPS = (26, 18, 11, 8)  # different coordinates per side of the box; more are joined to this many
+MOST_BOXES = 3100  # the first of GROUPS that keeps below this is taken
 SAME = 1e-6  # of the tool's extent: coordinates this close are one
 
 
@@ -53,7 +54,9 @@ def boxes_of(columns: tuple[Declaration, ...], w: Array, free: NDArray[np.int64]
     gaps = {i: d for i, d in gaps.items() if d.shape == one.shape and np.array_equal(d.low, one.low) and np.array_equal(d.area, one.area)}
     weights = np.array([sum(w[i] for i, d in gaps.items() if d.of == of) for of in ("done", "left")])
     skipped = np.setdiff1d(np.arange(n), np.concatenate([free, past]))
-    within, areas = _boxes(one)
+    within, areas = next((b for b in (_boxes(one, most) for most in GROUPS[:-1]) if len(b[1]) <= MOST_BOXES), None) or _boxes(
+        one, GROUPS[-1]
+    )
     whole = (np.ones((1, n), np.bool_), np.zeros(1))  # no box at all: costs nothing
     inside, inside_area = (within[w_], areas[w_]) if weights[0] > 0 and (w_ := within[:, past].all(axis=1)).any() else whole
     rest, rest_area = (within[w_], areas[w_]) if weights[1] > 0 and (w_ := within[:, skipped].all(axis=1)).any() else whole
@@ -88,9 +91,9 @@ def _exact(gaps: dict[int, Gap], w: Array, sets: NDArray[np.bool_], past: NDArra
     return total
 
 
-def _boxes(d: Gap) -> tuple[NDArray[np.bool_], Array]:
+def _boxes(d: Gap, most: int) -> tuple[NDArray[np.bool_], Array]:
     """Which regions lie in each box, (Q, N), and a lower bound on the area of a box of regions that has these sides, (Q,)."""
-    sides, spans = [_sides(d.low[:, k], d.high[:, k]) for k in range(2)], []
+    sides, spans = [_sides(d.low[:, k], d.high[:, k], most) for k in range(2)], []
     for low, high in sides:
         keep = low[:, None, 0] <= high[None, :, 0]
         i, j = np.nonzero(keep)
@@ -120,16 +123,16 @@ def _areas(d: Gap, one: Array, two: Array) -> Array:
     return share @ d.area
 
 
-def _sides(low: Array, high: Array) -> tuple[Array, Array]:
+def _sides(low: Array, high: Array, most: int) -> tuple[Array, Array]:
     """Groups of coordinates of either side, rows of (outer, inner)."""
     near = SAME * max(float(high.max() - low.min()), 1e-300)
-    lows = [(g.min(), g.max()) for g in _groups(np.unique(low), near)]
-    highs = [(g.max(), g.min()) for g in _groups(np.unique(high), near)]
+    lows = [(g.min(), g.max()) for g in _groups(np.unique(low), near, most)]
+    highs = [(g.max(), g.min()) for g in _groups(np.unique(high), near, most)]
     return np.array(lows), np.array(highs)
 
 
-def _groups(values: Array, near: float) -> list[Array]:
+def _groups(values: Array, near: float, most: int) -> list[Array]:
     groups = np.split(values, np.flatnonzero(np.diff(values) > near) + 1)
-    if len(groups) <= GROUPS:
+    if len(groups) <= most:
         return groups
-    return [np.concatenate([groups[i] for i in part]) for part in np.array_split(np.arange(len(groups)), GROUPS)]
+    return [np.concatenate([groups[i] for i in part]) for part in np.array_split(np.arange(len(groups)), most)]

@@ -2,7 +2,10 @@
 
 Many starts (beams, and sweeps over the tool in plain patterns) descend by exact re-ordering of stretches; the best of them
 then lose a few regions at a time and get them back where the whole is cheapest (`window.reinsert`), with a block moved
-elsewhere whenever nothing has helped for a while. Deterministic for a seed; the best order so far only ever gets cheaper.
+elsewhere whenever nothing has helped for a while. Costs that depend on the region before, and forbidden neighbours, are not
+seen by a re-insertion; it is only kept when the whole cost with them has not grown.
+
+Deterministic for a seed; the best order so far only ever gets cheaper.
 """
 
 from collections.abc import Callable, Iterator
@@ -26,7 +29,7 @@ Report = Callable[[float, float], None]  # (share of the budget used, cost of th
 class Effort:
     """How long to search."""
 
-    moves: int = 900  # re-insertions after the descents
+    moves: int = 700  # re-insertions after the descents
     beams: tuple[int, ...] = (1, 10, 100)
     stretch: int = 8  # regions re-ordered at a time in a descent
     taken: int = 6  # regions taken out at a time afterwards
@@ -45,8 +48,9 @@ class Search:
 
     def __init__(self, problem: SequencingProblem, w: Array, resolved: Resolved, seed: int) -> None:
         self.n, self.rng = problem.n, np.random.default_rng(seed)
-        self.problem, self.w = problem, w
-        self.model: Model | None = model_of(problem, w) if is_compiled(problem.features) else None
+        self.problem, self.w = problem, w[: len(problem.features.columns) + len(problem.interactions)]
+        self.model: Model | None = model_of(problem, self.w) if is_compiled(problem.features) else None
+        self.between, self.start = between_costs(problem, w)
         self.before, self.never_next = resolved.before, resolved.never_next
         self.done, self.free = np.zeros(problem.n, np.bool_), np.array(resolved.free, np.int64)
         self.done[list(resolved.done)] = True
@@ -58,12 +62,18 @@ class Search:
 
     def cost(self, order: Order) -> float:
         """The order's cost, plus a penalty for every forbidden neighbour."""
+        extra = self.penalty * self.broken(order) + self.on_the_way(order)
         if self.model is not None:
-            return float(order_cost(self.model, order, self.done)) + self.penalty * self.broken(order)
+            return float(order_cost(self.model, order, self.done)) + extra
         before = np.repeat(self.done[None, :], len(order), axis=0)
         before[:, order] = np.tri(len(order), k=-1, dtype=np.bool_)
         paid = (self.problem.values(before) @ self.w)[np.arange(len(order)), order]
-        return float(paid.sum()) + self.penalty * self.broken(order)
+        return float(paid.sum()) + extra
+
+    def on_the_way(self, order: Order) -> float:
+        """What depends on the region before."""
+        first = self.start[order[0]] if self.last_done < 0 else self.between[self.last_done, order[0]]
+        return float(first + self.between[order[:-1], order[1:]].sum())
 
     def broken(self, order: Order) -> int:
         """Pairs that must not follow each other but do."""
@@ -196,9 +206,18 @@ def best_found(
     return r.done + lowest[1]
 
 
+def between_costs(problem: SequencingProblem, w: Array) -> tuple[Array, Array]:
+    """What a region costs more after another, (N, N) [before, after], and as the first, (N,)."""
+    between, start = np.zeros((problem.n, problem.n)), np.zeros(problem.n)
+    last = getattr(problem, "last", ())
+    for weight, feature in zip(w[len(w) - len(last) :], last, strict=True):
+        between, start = between + weight * feature.between, start + weight * feature.start
+    return between, start
+
+
 def _starts(search: Search, problem: SequencingProblem, w: Array, r: Resolved, effort: Effort) -> Iterator[Order]:
     for width in effort.beams:
-        yield np.array(beam(problem, w, width, r), np.int64)
+        yield np.array(beam(problem, search.w, width, r), np.int64)
     if effort.sweeps:
         yield from search.sweeps()
 

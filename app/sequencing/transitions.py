@@ -50,7 +50,7 @@ def is_compiled(features: FeatureSet) -> bool:
 def model_of(problem: SequencingProblem, w: Array) -> Model:
     """The compiled form of w . phi for a problem whose feature set `is_compiled`; columns switched off weigh nothing."""
     g, kind = problem.graph, KINDS.index(base_name(problem.features.name))
-    w, columns = problem.check_weights(w), FEATURE_SETS[KINDS[kind]].columns
+    columns = FEATURE_SETS[KINDS[kind]].columns
     place = [columns.index(c) for c in problem.features.columns]
     weights = np.zeros(len(columns))
     weights[place] = w[: len(place)]
