@@ -26,7 +26,8 @@ from app.learning.certified import (
     is_hit,
     pool_for,
 )
-from app.learning.certified_state import CertifiedParameters, CertifiedResult, CertifiedState, Report, ToolChance
+from app.learning.certified_state import CertifiedParameters, CertifiedResult, CertifiedState, ConflictReport, Report, ToolChance
+from app.learning.conflicts import Conflict, conflict_words, conflicts
 from app.learning.cuts import CutPool, unit_rows
 from app.learning.outlook import Outlook, outlook
 from app.learning.pairs import PairQuestion, look_of, offers, question
@@ -34,6 +35,7 @@ from app.learning.performance_conflict import Contradiction, contradiction_words
 from app.learning.performance_state import LearningDemonstration, Metric
 from app.learning.qp import Array
 from app.learning.questions import fingerprint
+from app.sequencing.features import DEFAULT_INTERACTIONS, Interaction
 from app.sequencing.problem import EXACT_LIMIT, SequencingProblem
 
 Answers = Mapping[str, str]  # fingerprint -> "left" | "right" | "equal" | "cant_tell" | "both_wrong"
@@ -56,6 +58,7 @@ class Known:
     closed: frozenset[int]  # tools whose order the expert has chosen, or has to show
     chosen: frozenset[int]  # the first kind
     contradiction: Contradiction | None = None
+    conflicts: tuple[Conflict, ...] = ()  # the minimal sets behind it
 
 
 @dataclass
@@ -162,13 +165,19 @@ def _base(demonstrations: Demonstrations, tools: Tools, parameters: CertifiedPar
     everyone = tuple(range(len(demonstrations)))
     explored = explore(pool, everyone, prior, np.random.default_rng([seed, 0]))
     rows = np.zeros((0, pool.frame.size))
-    found = None
+    found, sets = None, ()
     if not _explains(pool, everyone, explored):
         found = find_contradiction(len(everyone), lambda members: 0.0 if fits(pool, members, prior) else left_over(pool, members, prior))
         if found and found.clear and found.rest:  # the compromise follows those that agree
             followed = tuple(i for i in everyone if i not in found.odd)
             explored = explore(pool, followed, prior, np.random.default_rng([seed, 1]))
-    return Known(pool, everyone, rows, explored, (), frozenset(), frozenset(), found)
+        sets = conflicts(demonstrations, prior, tools, _suspects(demonstrations[0].problem))
+    return Known(pool, everyone, rows, explored, (), frozenset(), frozenset(), found, sets)
+
+
+def _suspects(problem: SequencingProblem) -> tuple[Interaction, ...]:
+    """The paper's interactions, where the tools have their factors."""
+    return tuple(i for i in DEFAULT_INTERACTIONS if i.first in problem.features.factors and i.second in problem.features.factors)
 
 
 def fits(pool: CutPool, members: Ordered[int], prior: CertifiedPrior) -> bool:
@@ -265,7 +274,15 @@ def _report(demonstrations: Demonstrations, proof: Certificate, outlooks: dict[i
         oracle_calls=proof.oracle_calls,
         proved=all(d.problem.n <= EXACT_LIMIT for d in demonstrations),
         unclear=known.left_out,
+        conflicts=tuple(ConflictReport(c.members, c.slack, _resolving(c, demonstrations[0].problem)) for c in known.conflicts),
     )
+
+
+def _resolving(conflict: Conflict, problem: SequencingProblem) -> str:
+    """The last sentence of `conflict_words`; empty when nothing tried resolves it."""
+    names = [str(i) for i in range(max(conflict.members) + 1)]
+    words = conflict_words(conflict, names, problem)
+    return words[words.index("It would be resolved") :] if "It would be resolved" in words else ""
 
 
 def _metric(state: CertifiedState, report: Report) -> Metric:

@@ -46,6 +46,15 @@ class ToolChance:
 
 
 @dataclass(frozen=True)
+class ConflictReport:
+    """Demonstrations that exclude each other; without any one of them the rest fits."""
+
+    members: tuple[int, ...]
+    slack: tuple[float, ...]  # per member, how much dearer it is when the others are explained
+    resolved: str  # a sentence, empty when nothing tried resolves it
+
+
+@dataclass(frozen=True)
 class Report:
     """The certificate in plain values, as it is stored and shown."""
 
@@ -62,6 +71,7 @@ class Report:
     cuts: int
     oracle_calls: int
     proved: bool  # every demonstrated tool was searched completely
+    conflicts: tuple[ConflictReport, ...] = ()
     unclear: tuple[str, ...] = ()  # fingerprints of answers that contradict what was known and were left out
 
     def to_json(self) -> dict[str, Any]:
@@ -70,6 +80,7 @@ class Report:
         return {
             **{k: [list(x) if isinstance(x, tuple) else x for x in v] if isinstance(v, tuple) else v for k, v in fields.items()},
             "tools": [vars(t) for t in self.tools],
+            "conflicts": [{**vars(c), "members": list(c.members), "slack": list(c.slack)} for c in self.conflicts],
         }
 
 

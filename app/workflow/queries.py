@@ -33,8 +33,8 @@ CHOICES: dict[str, list[Json]] = {
     ],
 }
 CHOICES["pair"] = [
-    {"value": "left", "label": "The left one", "hint": "that is how I would do it", "key": "1"},
-    {"value": "right", "label": "The right one", "hint": "that is how I would do it", "key": "2"},
+    {"value": "left", "label": "The left one", "hint": "it is my way", "key": "1"},
+    {"value": "right", "label": "The right one", "hint": "it is my way", "key": "2"},
     {"value": "equal", "label": "About equal", "hint": "either is fine", "key": "3"},
     {"value": "both_wrong", "label": "Both are wrong", "hint": "I would show another order", "key": "4"},
     {"value": "cant_tell", "label": "Can't tell", "hint": "", "key": "0"},

@@ -174,6 +174,8 @@ def test_a_contradiction_names_the_tool_and_the_compromise_can_be_taken(sample: 
     assert run["error"]["tools"] == [tool["id"]]
     slack = {d["tool_id"]: d["slack"] for d in run["report"]["demonstrations"]}
     assert max(slack, key=slack.__getitem__) == tool["id"]
+    assert run["report"]["conflicts"]
+    assert all(tool["id"] in {t["tool_id"] for t in c["tools"]} for c in run["report"]["conflicts"])
     done = runs.finish_run(sample, run["id"])
     policy = policies.get_policy(sample, done["policy_id"])
     assert policy["converged"] is False

@@ -13,7 +13,7 @@ function parameterField(entry) {
   return h("label", {}, h("span", {}, h("span.symbol", { dataset: { tip: `${entry.symbol} in the paper, usually ${number(entry.default)}` } }, entry.label)), field);
 }
 
-const MODES = { certified: "With proof: every recorded order the best one, questions about tools you have not shown", paper: "As printed in the paper: step by step, questions about the tools you have shown" };
+const MODES = { certified: "With proof, asks about new tools", paper: "As in the paper, step by step" };
 
 // A performance run has two ways to learn, each with its own parameters.
 async function modeDrawer(projectId) {
@@ -117,7 +117,8 @@ function chances(report, project) {
   const row = (tool) => h("tr", {}, h("td", {}, tool.tool_name), h("td.num", { dataset: { tip: "Share of the weights that agree with all you said under which the chosen order is among the cheapest" } }, percent(tool.probability)),
     h("td.num", { dataset: { tip: "How much more the chosen order could cost than the best one, under any of these weights" } }, tool.extra < 1e-7 ? "nothing" : `${number(100 * tool.extra, 2)} %`),
     h("td", {}, tool.agreed ? "settled" : h("a", { href: pageAddress(project.id, "record", { tool: tool.tool_id }) }, "record it")));
-  return [odd.length ? h("p", {}, "Under the weights found: ", odd.map((entry, i) => [i ? ", " : "", h("a", { href: pageAddress(project.id, "record", { tool: entry.tool_id }) }, entry.tool_name), ` costs ${number(100 * entry.slack, 2)} % more than its cheapest order`]), ".") : null,
+  const exclude = (report.conflicts ?? []).map((conflict) => h("li", {}, conflict.tools.map((entry, i) => [i ? ", " : "", h("a", { href: pageAddress(project.id, "record", { tool: entry.tool_id }) }, entry.tool_name), h("span.muted", { dataset: { tip: "How much dearer its order is when the others are explained" } }, ` (${number(100 * entry.slack, 2)} %)`)]), ` exclude each other; without any one of them the rest fits. ${conflict.resolved}`));
+  return [exclude.length ? h("ul", {}, exclude) : null, odd.length ? h("p", {}, "Under the weights found: ", odd.map((entry, i) => [i ? ", " : "", h("a", { href: pageAddress(project.id, "record", { tool: entry.tool_id }) }, entry.tool_name), ` costs ${number(100 * entry.slack, 2)} % more than its cheapest order`]), ".") : null,
     report.tools.length ? h("details.drawer", { open: true, style: { width: "100%" } }, h("summary", { style: { padding: "0" } }, icon("right", "caret"), h("h2", {}, "Tools nobody has recorded"), h("span", {}, `expect ${number(report.expected_wrong, 2)} of ${report.tools.length} wrong`)),
       h("table.run-list", {}, h("thead", {}, h("tr", {}, h("th", {}, "Tool"), h("th.num", {}, "Order is right"), h("th.num", {}, "At worst dearer by"), h("th", {}, ""))), h("tbody", {}, report.tools.map(row)))) : null];
 }
