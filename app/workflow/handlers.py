@@ -4,7 +4,12 @@ from app.jobs.dispatcher import Jobs
 from app.workflow import import_job, playback_job, training_job
 from app.workflow.values import Values
 
-WARM_UP = ("app.sequencing.warming.warm_up", "app.geometry.regions.warm_up")
+WARM_UP = (
+    "app.sequencing.warming.warm_up",
+    "app.geometry.regions.warm_up",
+    "app.learning.many_optima.warm_up",
+    "app.learning.version_space.warm_up",
+)
 
 
 def register(jobs: Jobs, values: Values) -> None:
