@@ -13,12 +13,13 @@ from app.learning.effort_features import EFFORT_COLUMNS
 from app.learning.policy import Policy
 from app.learning.prediction import Prediction, predict
 from app.sequencing.constraints import Constraints, resolve
-from app.sequencing.features import FEATURE_SETS, Feature, interaction_column
+from app.sequencing.features import Feature, base_name, interaction_column
 from app.sequencing.problem import SequencingProblem, check_sequence
 from app.sequencing.shortest import gap_between
 from app.storage import emit
 from app.storage.tables import Plan, PolicyRow, Project, Segmentation, ToolRow
 from app.workflow.context import Context
+from app.workflow.feature_choice import ANY_TOOL, stored_features
 from app.workflow.lookup import found, present, ready_segmentation, standing
 from app.workflow.values import interactions_from
 
@@ -33,14 +34,14 @@ def list_policies(ctx: Context, project_id: str) -> list[Json]:
     def query(session: Session) -> list[Json]:
         present(session, Project, project_id)
         rows = session.exec(select(PolicyRow).where(PolicyRow.project_id == project_id).order_by(col(PolicyRow.id).desc())).all()
-        return [policy_json(row) for row in rows]
+        return [policy_json(session, row) for row in rows]
 
     return ctx.store.read(query)
 
 
 def get_policy(ctx: Context, policy_id: str) -> Json:
     """One policy."""
-    return ctx.store.read(lambda session: policy_json(found(session, PolicyRow, policy_id, "policy")))
+    return ctx.store.read(lambda session: policy_json(session, found(session, PolicyRow, policy_id, "policy")))
 
 
 def policy_value(row: PolicyRow) -> Policy:
@@ -110,7 +111,7 @@ def what_if(ctx: Context, plan_id: str, sequence: list[int]) -> Json:
         cut = found(session, Segmentation, row.segmentation_id, "segmentation")
         order = check_sequence(sequence, cut.region_count)
         policy = policy_value(found(session, PolicyRow, row.policy_id, "policy"))
-        problem = ctx.values.problem(session, cut, policy.interactions)
+        problem = ctx.values.problem(session, cut, policy.interactions, stored_features(session, policy.features))
         parts = policy.weights * (problem.feature_sum(order) - problem.steps_of(row.sequence).sum(axis=0))
         delta = float(parts.sum())
         features = [{"label": column.label, "delta": float(part)} for column, part in zip(problem.columns, parts, strict=True)]
@@ -119,7 +120,7 @@ def what_if(ctx: Context, plan_id: str, sequence: list[int]) -> Json:
     return ctx.store.read(query)
 
 
-def policy_json(row: PolicyRow) -> Json:
+def policy_json(session: Session, row: PolicyRow) -> Json:
     """The policy as REST shows it."""
     effort = row.effort_weights
     return {
@@ -131,7 +132,7 @@ def policy_json(row: PolicyRow) -> Json:
         "interactions": row.interactions,
         "weights": [
             {"key": c.key, "label": c.label, "symbol": c.symbol, "value": value, "identifiable": sure}
-            for c, value, sure in zip(_columns(row), row.weights, row.identifiable, strict=True)
+            for c, value, sure in zip(_columns(session, row), row.weights, row.identifiable, strict=True)
         ],
         "effort_weights": None
         if effort is None
@@ -159,7 +160,7 @@ def plan_json(ctx: Context, session: Session, row: Plan) -> Json:
         **_sureness(row.result),
         "constraints": row.result.get("constraints"),
         "orders": f"{math.factorial(len(row.sequence)):,}",
-        "features": [{"key": c.key, "label": c.label, "symbol": c.symbol} for c in _columns(policy)],
+        "features": [{"key": c.key, "label": c.label, "symbol": c.symbol} for c in _columns(session, policy)],
         "steps": [
             {"region": a, "name": tool.regions[a].name, "total": math.fsum(step), "parts": step}
             for a, step in zip(row.sequence, parts, strict=True)
@@ -169,8 +170,8 @@ def plan_json(ctx: Context, session: Session, row: Plan) -> Json:
     }
 
 
-def _columns(row: PolicyRow) -> tuple[Feature, ...]:
-    features = FEATURE_SETS[row.feature_set]
+def _columns(session: Session, row: PolicyRow) -> tuple[Feature, ...]:
+    features = stored_features(session, row.feature_set)
     added = tuple(interaction_column(k, i, features) for k, i in enumerate(interactions_from(row.interactions)))
     return features.columns + added
 
@@ -200,9 +201,10 @@ def sureness_words(cost: float, proved: bool, bound: float | None) -> str:
 def _to_predict(ctx: Context, session: Session, policy_id: str, tool_id: str) -> tuple[str, SequencingProblem, Policy, list[str]]:
     policy = found(session, PolicyRow, policy_id, "policy")
     cut = ready_segmentation(session, present(session, ToolRow, tool_id))
-    same = cut.feature_set == policy.feature_set
-    # another feature set: `predict` refuses it in words
-    problem = ctx.values.problem(session, cut, interactions_from(policy.interactions) if same else ())
+    # of a tool with another feature set: `predict` refuses it in words
+    suits = base_name(policy.feature_set) in (cut.feature_set, ANY_TOOL)
+    counted = (interactions_from(policy.interactions), stored_features(session, policy.feature_set)) if suits else ((), None)
+    problem = ctx.values.problem(session, cut, *counted)
     names = [region.name for region in ctx.values.tool(session, cut).regions]
     return cut.id, problem, policy_value(policy), names
 

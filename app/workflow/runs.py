@@ -6,6 +6,7 @@ from sqlmodel import Session, col, select
 
 from app.errors import Conflict, InvalidInput
 from app.jobs.rows import cancel_jobs
+from app.sequencing.features import base_name
 from app.storage.tables import (
     ACTIVE_RUN_STATES,
     Demonstration,
@@ -18,6 +19,7 @@ from app.storage.tables import (
     ToolRow,
 )
 from app.workflow.context import Context
+from app.workflow.feature_choice import project_features
 from app.workflow.lookup import check_tools, current_segmentation, found, present, refuse_while_training, standing, tools_of
 from app.workflow.queries import answer, get_query, list_queries, undo_answer
 from app.workflow.run_rows import (
@@ -83,6 +85,7 @@ def start_run(ctx: Context, project_id: str, kind: str, params: Json | None = No
             seed=DEFAULT_SEED if seed is None else seed,
             params=params or {},
             interactions=base.interactions if base else project.interactions,
+            features=base.feature_set if base else _features(session, project_id, shown),
             based_on=base.id if base else None,
         )
         session.add(row)
@@ -190,6 +193,11 @@ def _learner(kind: str, mode: str) -> str:
     return mode if kind == "performance" else kind
 
 
+def _features(session: Session, project_id: str, shown: list[Demonstration]) -> str:
+    """Name of the features that count in the project, on the demonstrated tools' set."""
+    return project_features(session, project_id, found(session, Segmentation, shown[0].segmentation_id, "segmentation").feature_set).name
+
+
 def _interest(session: Session, project_id: str, shown: list[Demonstration]) -> list[str]:
     """Segmentations of the other tools with the same features: what the weights are for, and what may be asked about."""
     trained = {d.tool_id for d in shown}
@@ -210,7 +218,7 @@ def _latest_policy(session: Session, project_id: str) -> PolicyRow:
 def _demonstrations(session: Session, project_id: str, base: PolicyRow | None) -> list[Demonstration]:
     """The standing demonstrations that share one feature set."""
     shown = [(d, found(session, Segmentation, d.segmentation_id, "segmentation").feature_set) for d in standing(session, project_id)]
-    wanted = base.feature_set if base else next((features for _, features in shown), None)
+    wanted = base_name(base.feature_set) if base else next((features for _, features in shown), None)
     kept = [d for d, features in shown if features == wanted]
     if not kept:
         raise InvalidInput("There is no recorded order to learn from. Record one first.")

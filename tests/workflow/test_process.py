@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from app.errors import InvalidFeature, InvalidInput, UnknownFeature
-from app.workflow import coverage, process, projects
+from app.workflow import coverage, policies, process, projects, runs, tools
 from app.workflow.context import Context
 
 OWN = """KEY, LABEL = "small_first", "Small regions first"
@@ -90,3 +90,27 @@ def test_a_choice_is_saved_renamed_taken_over_and_put_away(ctx: Context, project
     assert all(t["built_in"] for t in process.list_templates(ctx))
     with pytest.raises(InvalidInput, match="Built-in"):
         process.change_template(ctx, "layup", {"name": "Mine"})
+
+
+def test_a_run_and_its_policy_keep_the_features_they_started_with(ctx: Context, project: dict[str, Any]) -> None:
+    put(ctx, "small_first.py", OWN.replace(" + 0 * done", " * (1 - done.mean(axis=1, keepdims=True))"))
+    process.set_process(ctx, project["id"], {"without": ["opposite_unfinished", "opposite_finished"], "own": ["small_first"]})
+    run = runs.start_run(ctx, project["id"], "performance", {}, 1, "paper")
+    for _ in range(60):
+        assert ctx.jobs.wait_idle(60)
+        run = runs.get_run(ctx, run["id"])
+        if run["state"] != "waiting_for_expert":
+            break
+        for query in runs.list_queries(ctx, run_id=run["id"], state="open"):
+            runs.answer(ctx, query["id"], "not_similar")
+    if run["state"] in ("infeasible", "stalled"):
+        run = runs.finish_run(ctx, run["id"])
+    assert run["state"] == "converged"
+    process.set_process(ctx, project["id"], {"without": [], "own": []})
+    policy = next(p for p in policies.list_policies(ctx, project["id"]))
+    assert policy["feature_set"].startswith("clean~opposite_finished~opposite_unfinished+small_first@")
+    assert "small_first" in [w["key"] for w in policy["weights"]]
+    fresh = tools.list_tools(ctx, project["id"])[-1]
+    plan = policies.make_plan(ctx, policy["id"], fresh["id"])
+    assert sorted(plan["sequence"]) == list(range(fresh["region_count"]))
+    assert len(plan["features"]) == len(policy["weights"])
