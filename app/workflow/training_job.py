@@ -196,8 +196,20 @@ def _named(session: Session, row: Run, report: Json) -> Json:
         for d, slack, size in zip(shown, report["slack"] or [0.0] * len(shown), ties, strict=True)
     ]
     tools = [{**name(cuts[t["tool"]].tool_id), **{k: v for k, v in t.items() if k != "tool"}} for t in report["tools"]]
+    conflicts = [
+        {
+            "tools": [{**name(shown[i].tool_id), "slack": x} for i, x in zip(c["members"], c["slack"], strict=True)],
+            "resolved": c["resolved"],
+        }
+        for c in report["conflicts"]
+    ]
     left_out = {"slack", "class_sizes", "identifiable"}
-    return {**{k: v for k, v in report.items() if k not in left_out}, "demonstrations": demonstrated, "tools": tools}
+    return {
+        **{k: v for k, v in report.items() if k not in left_out},
+        "demonstrations": demonstrated,
+        "tools": tools,
+        "conflicts": conflicts,
+    }
 
 
 def _close(session: Session, row: Run, out: Outcome) -> None:
