@@ -54,7 +54,9 @@ def compare_experts(
     names = tuple(demonstrations)
     apart = tuple(certify(demonstrations[name], prior, tools) for name in names)
     chosen = [[_order(tool, c.weights) for c in apart] for tool in tools]
-    likeness = np.array([[np.mean([kendall_tau(row[a], row[b]) for row in chosen]) for b in range(len(names))] for a in range(len(names))])
+    likeness: Array = np.array(
+        [[float(np.mean([kendall_tau(row[a], row[b]) for row in chosen])) for b in range(len(names))] for a in range(len(names))]
+    )
     everyone = [d for name in names for d in demonstrations[name]]
     pooled = certify(everyone, prior, tools)
     found = [
