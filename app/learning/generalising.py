@@ -77,8 +77,10 @@ def learn_generalising(
     if not demonstrations:
         raise InvalidInput("Learning needs at least one demonstration.")
     tried: list[tuple[Trial, SoftFit, Array, tuple[bool, ...]]] = []
-    for name in sets or (demonstrations[0].problem.features.name, LAYOUT):
-        shown = [replace(d, problem=on_features(d.problem, FEATURE_SETS[name])) for d in demonstrations]
+    own = demonstrations[0].problem.features  # perhaps with features switched off or added
+    known = {**FEATURE_SETS, own.name: own}
+    for name in sets or (own.name, LAYOUT):
+        shown = [replace(d, problem=on_features(d.problem, known[name])) for d in demonstrations]
         lessons, scale, live = lessons_of(shown)
         start = None
         for penalty in penalties if len(shown) > 1 else penalties[:1]:
@@ -86,7 +88,7 @@ def learn_generalising(
             start = found.weights
             tried.append((_tried(shown, lessons, found, np.array(live) / scale), found, scale, live))
     best, found, scale, live = max(tried, key=lambda t: t[0].merit)
-    features = FEATURE_SETS[best.features]
+    features = known[best.features]
     policy = Policy(found.weights / scale * np.array(live), features.name, features.version, (), None, live)
     return Generalised(policy, tuple(t for t, *_ in tried), scale, found)
 

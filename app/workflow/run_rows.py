@@ -123,7 +123,7 @@ def go(session: Session, row: Run, state: str, message: str | None = None) -> No
     emit(session, "run.changed", row.project_id, run_id=row.id, state=state)
 
 
-def train_on(session: Session, row: Run, message: str) -> None:
+def train_on(session: Session, row: Run, message: str, args: Json | None = None) -> None:
     """Let the run compute its next step."""
     row.error = None
     go(session, row, "training" if row.checkpoint else "queued", message)
@@ -133,6 +133,7 @@ def train_on(session: Session, row: Run, message: str) -> None:
         row.project_id,
         row.id,
         "Learning from your orders" if row.kind == "performance" else "Learning what is effort",
+        args or {},
     )
 
 

@@ -7,6 +7,7 @@ from sqlmodel import Session, col, select
 from app.errors import Conflict, InvalidInput
 from app.jobs.rows import cancel_jobs
 from app.sequencing.features import base_name
+from app.sequencing.problem import TENSOR_LIMIT
 from app.storage.tables import (
     ACTIVE_RUN_STATES,
     Demonstration,
@@ -19,7 +20,7 @@ from app.storage.tables import (
     ToolRow,
 )
 from app.workflow.context import Context
-from app.workflow.feature_choice import project_features
+from app.workflow.feature_choice import ANY_TOOL, project_features
 from app.workflow.lookup import check_tools, current_segmentation, found, present, refuse_while_training, standing, tools_of
 from app.workflow.queries import answer, get_query, list_queries, undo_answer
 from app.workflow.run_rows import (
@@ -34,6 +35,8 @@ from app.workflow.run_rows import (
     withdraw,
     write_policy,
 )
+from app.workflow.training_job import demonstrations_of
+from app.workflow.training_step import LIKELIHOOD
 
 __all__ = [
     "answer",
@@ -161,7 +164,8 @@ def resume(ctx: Context, run_id: str) -> Json:
 def finish_run(ctx: Context, run_id: str) -> Json:
     """Take what a stalled run has learned: all it could still ask about was called just as good.
 
-    An infeasible run's weights can be taken too, as a compromise; the policy says that it did not converge.
+    An infeasible run can be finished too, as a compromise; the policy says that it did not converge. In the paper's mode these are
+    the weights it had; otherwise what predicts the contradicting orders best is learned in the background.
     """
 
     def change(session: Session) -> Json:
@@ -169,6 +173,9 @@ def finish_run(ctx: Context, run_id: str) -> Json:
         checkpoint = checkpoint_of(session, row)
         if row.state not in ("stalled", "infeasible") or checkpoint is None:
             raise Conflict(f"Only a run that found nothing left to learn can be finished; this one is {row.state.replace('_', ' ')}.")
+        if row.state == "infeasible" and row.mode == "certified" and _small_enough(session, row):
+            train_on(session, row, "Looking for what predicts your orders best.", {LIKELIHOOD: True})
+            return run_json(session, row)
         write_policy(session, row, checkpoint.weights, checkpoint.identifiable, converged=False)
         words = "Finished with what was learned so far." if row.state == "stalled" else _compromise_words(session, row)
         row.error = None
@@ -176,6 +183,12 @@ def finish_run(ctx: Context, run_id: str) -> Json:
         return run_json(session, row)
 
     return ctx.store.write(change)
+
+
+def _small_enough(session: Session, row: Run) -> bool:
+    """Whether likelihood can be computed on every tool of a run."""
+    cuts = [found(session, Segmentation, d.segmentation_id, "segmentation") for d in demonstrations_of(session, row.id)]
+    return all(cut.region_count <= TENSOR_LIMIT for cut in cuts)
 
 
 def _compromise_words(session: Session, row: Run) -> str:
@@ -218,7 +231,8 @@ def _latest_policy(session: Session, project_id: str) -> PolicyRow:
 def _demonstrations(session: Session, project_id: str, base: PolicyRow | None) -> list[Demonstration]:
     """The standing demonstrations that share one feature set."""
     shown = [(d, found(session, Segmentation, d.segmentation_id, "segmentation").feature_set) for d in standing(session, project_id)]
-    wanted = base_name(base.feature_set) if base else next((features for _, features in shown), None)
+    own = base_name(base.feature_set) if base else ANY_TOOL
+    wanted = own if own != ANY_TOOL else next((features for _, features in shown), None)
     kept = [d for d, features in shown if features == wanted]
     if not kept:
         raise InvalidInput("There is no recorded order to learn from. Record one first.")

@@ -21,7 +21,7 @@ from app.storage.tables import Demonstration, JobRow, Metric, PolicyRow, Query, 
 from app.workflow.feature_choice import stored_features
 from app.workflow.lookup import current_segmentation, found, same_regions
 from app.workflow.run_rows import TRAINING_JOB, checkpoint_of, current_answer, go, learner, parameters_for, write_policy
-from app.workflow.training_step import Asked, Outcome, Parameters, Step, compute
+from app.workflow.training_step import LIKELIHOOD, Asked, Outcome, Parameters, Step, compute
 from app.workflow.values import Values, interactions_from
 
 Json = dict[str, Any]
@@ -58,7 +58,7 @@ def prepare(values: Values, session: Session, job: JobRow) -> Step | None:
     cuts = [found(session, Segmentation, key, "segmentation") for key in row.interest]
     return Step(
         run_id=row.id,
-        kind=row.kind,
+        kind=LIKELIHOOD if job.args.get(LIKELIHOOD) else row.kind,
         keys=tuple(keys),
         demonstrations=tuple(demonstrations),
         parameters=_parameters(row),
@@ -89,6 +89,8 @@ def finish(values: Values, session: Session, job: JobRow, out: Outcome) -> None:
     row = session.get(Run, job.subject_id)
     if row is None or row.state not in ("queued", "training"):
         return
+    if out.outcome == "compromise":
+        return _settle(session, row, out)
     for iteration, loss, terms, violations in out.metrics:
         session.merge(Metric(run_id=row.id, iteration=iteration, loss=loss, terms=terms, violations=violations))
     row.iteration = out.iteration
@@ -224,6 +226,14 @@ def _close(session: Session, row: Run, out: Outcome) -> None:
             "tools": [shown[i].tool_id for i in found_odd],
         }
     go(session, row, out.outcome, _words(session, row, out))
+
+
+def _settle(session: Session, row: Run, out: Outcome) -> None:
+    """The policy of orders that contradict each other: on the features that predict them best, without interactions."""
+    policy = write_policy(session, row, list(out.weights), list(out.identifiable), converged=False)
+    policy.feature_set, policy.interactions, policy.certificate = out.features or policy.feature_set, [], out.report
+    session.add(policy)
+    go(session, row, "converged", out.message)
 
 
 def _words(session: Session, row: Run, out: Outcome) -> str:

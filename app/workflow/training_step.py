@@ -9,6 +9,7 @@ from app.jobs.worker import Report
 from app.learning.certified_run import Memory, certified_step, start_certified
 from app.learning.certified_state import CertifiedParameters, CertifiedState
 from app.learning.effort import EffortParameters, EffortState, effort_step, start_effort
+from app.learning.generalising import learn_generalising
 from app.learning.performance import (
     LearningDemonstration,
     PerformanceParameters,
@@ -26,6 +27,7 @@ Json = dict[str, Any]
 Parameters = PerformanceParameters | CertifiedParameters | EffortParameters
 MetricRow = tuple[int, float, dict[str, float], int]
 
+LIKELIHOOD = "likelihood"  # kind of the step that settles a contradiction
 CHUNK = 25  # iterations per job: a few seconds at most between two checkpoints
 _problems = Kept(48)  # of a worker process: their tables are costly to build
 _memories = Kept(4)  # of a worker process: what earlier steps of a certified run found; losing it costs only time
@@ -76,12 +78,15 @@ class Outcome:
     message: str
     contradiction: Contradiction | None = None
     report: Json | None = None  # certified: with indices for tools and demonstrations
+    features: str | None = None  # likelihood: name of the feature set it chose
 
 
 def compute(step: Step, report: Report) -> Outcome:
     """One step of the learner; pure."""
     report(0.05, "Comparing orders")
     known = [LearningDemonstration(_known(key, d.problem), d.sequence) for key, d in zip(step.keys, step.demonstrations, strict=True)]
+    if step.kind == LIKELIHOOD:
+        return _likelihood(step, known)
     if isinstance(step.parameters, CertifiedParameters):
         return _certified(step, step.parameters, known)
     if isinstance(step.parameters, EffortParameters):
@@ -110,6 +115,26 @@ def _certified(step: Step, parameters: CertifiedParameters, demonstrations: list
         contradiction=result.contradiction,
         report=result.report.to_json(),
     )
+
+
+def _likelihood(step: Step, demonstrations: list[LearningDemonstration]) -> Outcome:
+    """What predicts orders best that contradict each other, each left out in turn."""
+    found = learn_generalising(demonstrations)
+    chosen, policy = found.chosen, found.policy
+    report = {
+        "kind": LIKELIHOOD,
+        "held_out_hits": chosen.hits,
+        "of": len(demonstrations),
+        "tau": chosen.tau,
+        "features": chosen.features,
+        "penalty": chosen.penalty,
+    }
+    words = (
+        "Your orders contradict each other, so exceptions are allowed for. Each order left out in turn, "
+        f"{chosen.hits} of {len(demonstrations)} were predicted from the others (mean agreement {chosen.tau:.2f})."
+    )
+    weights, sure = _floats(policy.weights), tuple(bool(x) for x in policy.identifiable)
+    return Outcome(step.state or {}, "compromise", 0, (), (), weights, sure, words, None, report, policy.features)
 
 
 def _performance(step: Step, parameters: PerformanceParameters, demonstrations: list[LearningDemonstration]) -> Outcome:

@@ -176,10 +176,18 @@ def test_a_contradiction_names_the_tool_and_the_compromise_can_be_taken(sample: 
     assert max(slack, key=slack.__getitem__) == tool["id"]
     assert run["report"]["conflicts"]
     assert all(tool["id"] in {t["tool_id"] for t in c["tools"]} for c in run["report"]["conflicts"])
-    done = runs.finish_run(sample, run["id"])
+    done = settle(sample, runs.finish_run(sample, run["id"]))
+    assert done["state"] == "converged"
     policy = policies.get_policy(sample, done["policy_id"])
     assert policy["converged"] is False
-    assert policy["certificate"]["realisable"] is False
+    assert policy["certificate"]["kind"] == "likelihood"
+    assert 0 < policy["certificate"]["held_out_hits"] <= policy["certificate"]["of"] == 6
+    unseen = next(t for t in tools.list_tools(sample, project) if t["split"] == "test")
+    plan = policies.make_plan(sample, policy["id"], unseen["id"])
+    assert sorted(plan["sequence"]) == list(range(unseen["region_count"]))
+    assert sum(step["total"] for step in plan["steps"]) == pytest.approx(plan["cost"], abs=1e-9)
+    effort = settle(sample, runs.start_run(sample, project, "effort"))
+    assert effort["state"] in ("waiting_for_expert", "converged"), effort["message"]
 
 
 def test_a_tool_with_an_open_question_stays(sample: Context) -> None:
