@@ -5,6 +5,7 @@ hold for all of them then bends the weights towards the exceptions. Likelihood l
 decided by the demonstrations, and by nothing else: the weights, how strongly they are held near zero, and which feature set.
 """
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,8 +18,10 @@ from app.learning.performance_state import LearningDemonstration
 from app.learning.policy import Policy
 from app.learning.qp import Array
 from app.sequencing.features import FEATURE_SETS, FeatureSet
-from app.sequencing.problem import SequencingProblem
+from app.sequencing.problem import TENSOR_LIMIT, SequencingProblem
 
+FEWEST = 4  # demonstrations from which leaving one out says something
+CLEARLY = 0.3  # of the demonstrations
 PENALTIES = (0.3, 0.1, 0.03, 0.01)  # strongest first: each fit starts from the one before
 LAYOUT = "layout"
 
@@ -98,29 +101,63 @@ class Unasked:
     """The product's choice without answers."""
 
     policy: Policy
-    certificate: Certificate | None  # the demonstrations agree under one set of weights, proved; None: they do not
+    certificate: Certificate | None  # the demonstrations agree under one set of weights, proved; None: exceptions are allowed for
     generalised: Generalised | None  # then likelihood decides
+    certified_hits: int | None  # demonstrations predicted by certified weights learned without them; None: they contradict each other
 
 
 def learn_unasked(demonstrations: list[LearningDemonstration], seed: int = 0) -> Unasked:
-    """Certified weights where the demonstrations agree exactly, else the policy that best predicts those left out.
+    """Certified weights where the demonstrations agree exactly and predict each other, else the policy that best predicts those left out.
 
     An expert who follows the weights to the letter is predicted best by the weights that all demonstrations agree on; one who makes
-    exceptions, by likelihood. Which kind it is, the demonstrations say themselves.
+    exceptions, by likelihood. Which kind it is, the demonstrations say themselves: a few orders can often be explained exactly by weights
+    that predict nothing, so agreement alone isn't enough.
 
     Raises:
         EmptySample: No demonstration, or all orders have the same features.
         InvalidInput: The tools differ in their features, or one has too many regions for likelihood.
     """
     certificate = certify(demonstrations, seed=seed)
-    if certificate.realisable:
+    found = exceptions_predict_better(demonstrations, seed) if certificate.realisable else None
+    if certificate.realisable and found is None:
         first = demonstrations[0].problem
         policy = Policy(
             certificate.weights, first.features.name, first.features.version, first.interactions, None, certificate.identifiable
         )
-        return Unasked(policy, certificate, None)
-    found = learn_generalising(demonstrations)
-    return Unasked(found.policy, None, found)
+        return Unasked(policy, certificate, None, None)
+    if found is not None:
+        return Unasked(found.generalised.policy, None, found.generalised, found.certified_hits)
+    generalised = learn_generalising(demonstrations)
+    return Unasked(generalised.policy, None, generalised, None)
+
+
+@dataclass(frozen=True)
+class Exceptions:
+    """Why an expert whose orders agree exactly is better predicted by allowing for exceptions."""
+
+    generalised: Generalised
+    certified_hits: int  # demonstrations predicted by certified weights learned without them
+
+
+def exceptions_predict_better(demonstrations: list[LearningDemonstration], seed: int = 0) -> Exceptions | None:
+    """The likelihood's policy if it is on other features and, each demonstration left out in turn, predicts clearly more of them.
+
+    Clearly is `CLEARLY` of the demonstrations, at least two. On the same features exact agreement decides: an expert who agrees with
+    them to the letter makes no exceptions. None below `FEWEST` demonstrations, and on tools that are too large for likelihood.
+    """
+    if len(demonstrations) < FEWEST or any(d.problem.n > TENSOR_LIMIT for d in demonstrations):
+        return None
+    generalised = learn_generalising(demonstrations)
+    if generalised.chosen.features == demonstrations[0].problem.features.name:
+        return None
+    needed = generalised.chosen.hits - max(2, math.ceil(CLEARLY * len(demonstrations)))
+    hits = 0
+    for i, left_out in enumerate(demonstrations):
+        if hits > needed:
+            return None
+        weights = certify([*demonstrations[:i], *demonstrations[i + 1 :]], seed=seed).weights
+        hits += judge(left_out.problem, weights, left_out.sequence).hit
+    return Exceptions(generalised, hits) if hits <= needed else None
 
 
 def _tried(shown: list[LearningDemonstration], lessons: list[Lesson], found: SoftFit, unit: Array) -> Trial:

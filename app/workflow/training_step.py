@@ -9,7 +9,7 @@ from app.jobs.worker import Report
 from app.learning.certified_run import Memory, certified_step, start_certified
 from app.learning.certified_state import CertifiedParameters, CertifiedState
 from app.learning.effort import EffortParameters, EffortState, effort_step, start_effort
-from app.learning.generalising import learn_generalising
+from app.learning.generalising import Generalised, exceptions_predict_better, learn_generalising
 from app.learning.performance import (
     LearningDemonstration,
     PerformanceParameters,
@@ -28,6 +28,11 @@ Parameters = PerformanceParameters | CertifiedParameters | EffortParameters
 MetricRow = tuple[int, float, dict[str, float], int]
 
 LIKELIHOOD = "likelihood"  # kind of the step that settles a contradiction
+CONTRADICT = "Your orders contradict each other, so exceptions are allowed for. Each order left out in turn,"
+AGREE = (
+    "One set of weights explains every order exactly, but it would have predicted only {} of {} of them from the others. "
+    "With exceptions allowed for,"
+)
 CHUNK = 25  # iterations per job: a few seconds at most between two checkpoints
 _problems = Kept(48)  # of a worker process: their tables are costly to build
 _memories = Kept(4)  # of a worker process: what earlier steps of a certified run found; losing it costs only time
@@ -86,7 +91,12 @@ def compute(step: Step, report: Report) -> Outcome:
     report(0.05, "Comparing orders")
     known = [LearningDemonstration(_known(key, d.problem), d.sequence) for key, d in zip(step.keys, step.demonstrations, strict=True)]
     if step.kind == LIKELIHOOD:
-        return _likelihood(step, known)
+        return _likelihood(learn_generalising(known), len(known), CONTRADICT)
+    if isinstance(step.parameters, CertifiedParameters) and step.state is None:
+        exceptions = exceptions_predict_better(known, step.seed)
+        if exceptions is not None:
+            words = AGREE.format(exceptions.certified_hits, len(known))
+            return _likelihood(exceptions.generalised, len(known), words)
     if isinstance(step.parameters, CertifiedParameters):
         return _certified(step, step.parameters, known)
     if isinstance(step.parameters, EffortParameters):
@@ -117,24 +127,20 @@ def _certified(step: Step, parameters: CertifiedParameters, demonstrations: list
     )
 
 
-def _likelihood(step: Step, demonstrations: list[LearningDemonstration]) -> Outcome:
-    """What predicts orders best that contradict each other, each left out in turn."""
-    found = learn_generalising(demonstrations)
+def _likelihood(found: Generalised, count: int, why: str) -> Outcome:
+    """The policy that allows for exceptions, and how well it predicts each of `count` demonstrations left out in turn."""
     chosen, policy = found.chosen, found.policy
     report = {
         "kind": LIKELIHOOD,
         "held_out_hits": chosen.hits,
-        "of": len(demonstrations),
+        "of": count,
         "tau": chosen.tau,
         "features": chosen.features,
         "penalty": chosen.penalty,
     }
-    words = (
-        "Your orders contradict each other, so exceptions are allowed for. Each order left out in turn, "
-        f"{chosen.hits} of {len(demonstrations)} were predicted from the others (mean agreement {chosen.tau:.2f})."
-    )
+    words = f"{why} {chosen.hits} of {count} are predicted from the others (mean agreement {chosen.tau:.2f})."
     weights, sure = _floats(policy.weights), tuple(bool(x) for x in policy.identifiable)
-    return Outcome(step.state or {}, "compromise", 0, (), (), weights, sure, words, None, report, policy.features)
+    return Outcome({}, "compromise", 0, (), (), weights, sure, words, None, report, policy.features)
 
 
 def _performance(step: Step, parameters: PerformanceParameters, demonstrations: list[LearningDemonstration]) -> Outcome:
