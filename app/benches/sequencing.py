@@ -15,7 +15,7 @@ from app.geometry.tool import Array, RegionGraph
 from app.sequencing import kernels
 from app.sequencing.classes import best_classes
 from app.sequencing.constraints import resolve
-from app.sequencing.exact import bytes_needed, costs_to_go, form_for, model_for, parallel_is_safe
+from app.sequencing.exact import THREADS_FROM, bytes_needed, costs_to_go, form_for, model_for, parallel_is_safe
 from app.sequencing.problem import SequencingProblem, problem_for
 from app.sequencing.shortest import shortest_sequence
 
@@ -31,7 +31,7 @@ def measure(options: Options) -> Iterator[Figure]:
     for n in sizes:
         yield from _solves(n, (), "separable", bars=True)
         yield from _solves(n, None, "with two interactions", bars=False)
-    yield from _memory()
+    yield from _memory(options.quick)
     yield from _agreement(options.quick)
     yield from _first_call()
     yield from _ratios(options)
@@ -72,35 +72,54 @@ def _best(call: Callable[[], object], seconds: float) -> tuple[float, float]:
 
 
 def _solves(n: int, interactions: tuple[()] | None, words: str, bars: bool) -> Iterator[Figure]:
+    """One solve: costs-to-go under new weights, and the whole answer; both by the wall clock on the threads the product uses."""
     problem, w = made_up(n, interactions)
     started = time.process_time()
     model = model_for(problem, resolve(None, n))
     prepared = 1e3 * (time.process_time() - started)
-    v = costs_to_go(model, form_for(model, w))  # threads started, buffers touched
-    del v
+    costs_to_go(model, form_for(model, w))  # threads started, buffers touched
+    group, bar = f"exact, {words}", BARS_MS.get(n) if bars else None
     one_wall, one = _best(lambda: costs_to_go(model, form_for(model, w), threads=False), 0.5)
-    group = f"exact, {words}"
-    note = f"one thread {one:.3g} ms cpu, {one_wall:.3g} ms wall"
-    bar = BARS_MS.get(n) if bars else None
-    if n >= 16 and parallel_is_safe():
-        wall, _ = _best(lambda: costs_to_go(model, form_for(model, w), threads=True), 0.5)
-        note += f"; two threads {wall:.3g} ms wall; the value is the lesser of that and one thread's cpu"
-        yield Figure(group, f"N = {n}, costs-to-go, new weights", min(wall, one), "ms", bar, note=note)
+    two = n >= THREADS_FROM and parallel_is_safe()
+    wall = _best(lambda: costs_to_go(model, form_for(model, w)), 0.5)[0] if two else one_wall
+    threads = "two threads" if two else "one thread, as the product does at this size"
+    note = f"wall, {threads}; one thread: {one:.3g} ms cpu, {one_wall:.3g} ms wall"
+    yield Figure(group, f"N = {n}, costs-to-go, new weights", wall, "ms", bar, note=note)
+    whole, cpu = _best(lambda: shortest_sequence(problem, w), 0.5)
+    note = f"wall, {threads}; {cpu:.3g} ms cpu of all threads"
+    yield Figure(group, f"N = {n}, with sequence, ties and float64 cost", whole, "ms", bar, note=note)
+    if two:
         yield Figure(group, f"N = {n}, speed-up of 2 threads", one_wall / wall, "x", note="wall against wall; a busy machine lowers it")
-    else:
-        yield Figure(group, f"N = {n}, costs-to-go, new weights", one, "ms", bar, note=note)
-    _, whole = _best(lambda: shortest_sequence(problem, w), 0.5)
-    yield Figure(group, f"N = {n}, sequence, ties and float64 cost too (cpu)", whole, "ms", note="cpu of all threads added up")
     yield Figure(group, f"N = {n}, tables of the tool, once (cpu)", prepared, "ms")
     if n == 20 and not bars:
         _, classes = _best(lambda: best_classes(problem, w, 10), 0.5)
         yield Figure(group, "N = 20, ten best cost classes, counted (cpu)", classes, "ms")
 
 
-def _memory() -> Iterator[Figure]:
+LARGEST = """
+import resource, sys
+from app.benches.sequencing import made_up
+from app.sequencing.exact import Limits
+from app.sequencing.shortest import shortest_sequence
+problem, w = made_up(int(sys.argv[1]))
+begun = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+assert shortest_sequence(problem, w, limits=Limits(regions=28)).proved
+print(begun, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+def _memory(quick: bool) -> Iterator[Figure]:
+    """Tables as computed at N = 28; a process of its own that solves N = 26, as the system counts it."""
     problem, _ = made_up(28)
     note = "computed from the arrays allocated; not run here"
     yield Figure("memory", "N = 28, all tables", bytes_needed(problem, 28) / 1e9, "GB", MOST_BYTES / 1e9, note=note)
+    if quick:
+        return
+    out = subprocess.run([sys.executable, "-c", LARGEST, "26"], capture_output=True, text=True, check=True).stdout.split()
+    before, most = (1024 * float(x) / 1e9 for x in out)
+    computed = bytes_needed(made_up(26)[0], 26) / 1e9
+    note = f"most resident memory of a process; {before:.2g} GB of it before the solve; tables computed as {computed:.2g} GB"
+    yield Figure("memory", "N = 26, one solve, measured", most, "GB", note=note)
 
 
 def _agreement(quick: bool) -> Iterator[Figure]:
