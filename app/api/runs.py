@@ -2,11 +2,12 @@
 
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, File, Query, Response, UploadFile
 from pydantic import Field
 
 from app.api.dependencies import Body, Ctx, Json, Paging, Row, Seed, located, page
 from app.api.idempotency import ActionRoute, IdempotencyKey
+from app.workflow import question_files
 from app.workflow import runs as workflow
 
 router = APIRouter(tags=["runs"], route_class=ActionRoute)
@@ -94,6 +95,36 @@ class MetricList(Row):
     next: None = None
 
 
+class AppliedAnswer(Row):
+    """A row of the file that counts."""
+
+    line: int
+    query_id: str
+    tool_name: str
+    value: str
+    id: str  # of the answer, to take it back
+
+
+class RowFault(Row):
+    """A row of the file that doesn't count, and why."""
+
+    line: int
+    text: str
+
+
+class AnswersReport(Row):
+    """What a file of answers did."""
+
+    applied: list[AppliedAnswer]
+    already: list[RowFault]  # answered before
+    faults: list[RowFault]
+    left_open: int  # rows without an answer
+    run_state: str
+
+
+QUESTION_POLICY = "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
+
+
 @router.get("/projects/{project_id}/runs")
 def list_runs(ctx: Ctx, project_id: str, paging: Paging) -> RunPage:
     """The runs of a project."""
@@ -140,3 +171,28 @@ def resume_run(ctx: Ctx, run_id: str, response: Response, _key: IdempotencyKey =
 def finish_run(ctx: Ctx, run_id: str, response: Response, _key: IdempotencyKey = None) -> Json:
     """Accept the weights of a stalled run: everything it could still ask about was called similar."""
     return located(response, "runs", workflow.finish_run(ctx, run_id))
+
+
+@router.get("/runs/{run_id}/questions.csv", response_class=Response, responses={200: {"content": {"text/csv": {}}}})
+def questions_csv(ctx: Ctx, run_id: str) -> Response:
+    """The open questions as a table; fill in the last column and send it to /answers."""
+    headers = {"Content-Disposition": 'attachment; filename="questions.csv"'}
+    return Response(question_files.questions_csv(ctx, run_id), media_type="text/csv; charset=utf-8", headers=headers)
+
+
+@router.get("/runs/{run_id}/questions.html", response_class=Response, responses={200: {"content": {"text/html": {}}}})
+def questions_html(ctx: Ctx, run_id: str) -> Response:
+    """The open questions as one page to print, with pictures and boxes to tick."""
+    headers = {"Content-Security-Policy": QUESTION_POLICY}
+    return Response(question_files.questions_page(ctx, run_id), media_type="text/html; charset=utf-8", headers=headers)
+
+
+@router.post("/runs/{run_id}/answers", response_model=AnswersReport)
+def read_answers(
+    ctx: Ctx,
+    run_id: str,
+    file: Annotated[UploadFile, File(description="CSV with the columns `query id` and `answer`; others are not read.")],
+    _key: IdempotencyKey = None,
+) -> Json:
+    """Answer questions from a file. Each row counts or is named with its fault; what was answered before stays."""
+    return question_files.read_answers(ctx, run_id, file.file.read(question_files.MOST_BYTES + 1))

@@ -34,7 +34,11 @@ BODIES: dict[str, dict[str, Any]] = {
     "change_editing": {"selection": []},
     "control_playback": {"action": "pause"},
 }
-UPLOADS = {"upload_tool": ("x.stl", tetrahedron()), "import_region_table": ("x.csv", REAL_TABLE.encode())}
+UPLOADS = {
+    "upload_tool": ("x.stl", tetrahedron()),
+    "import_region_table": ("x.csv", REAL_TABLE.encode()),
+    "read_answers": ("x.csv", b"query id,answer\n"),
+}
 WITHOUT_IDS = {"region_table_template", "list_projects", "create_project", "create_sample_project", "list_templates", "healthz", "readyz"}
 
 

@@ -6,17 +6,19 @@ import { bind } from "../keys.js";
 import { Stepper } from "../stepper.js";
 import { strip } from "../strip.js";
 import { View3D } from "../view3d.js";
+import { QuestionFile } from "./teach-file.js";
 
 const WIDE = "(min-width: 1100px)";
 const MOST_TICKS = 24;
 
 export class QuestionView {
-  constructor({ projectId, regionsOf, onAnswer, onUndo, canUndo }) {
+  constructor({ projectId, regionsOf, onAnswer, onUndo, canUndo, onFile }) {
     this.projectId = projectId;
     this.regionsOf = regionsOf;
     this.onAnswer = onAnswer;
     this.onUndo = onUndo;
     this.canUndo = canUndo;
+    this.file = new QuestionFile({ onRead: onFile });
     this.query = null;
     this.chosen = "left";
     this.wide = matchMedia(WIDE);
@@ -27,7 +29,7 @@ export class QuestionView {
     this.answers = h("div.answers", { role: "group", "aria-labelledby": "question-title" });
     this.below = h("div.below");
     this.stepper = new Stepper({ n: 1, name: "Play both", onStep: () => this.paint(), when: () => this.active });
-    this.nodes = [this.top, this.switch, this.pair, this.stepper.node, this.answers, this.below];
+    this.nodes = [this.top, this.switch, this.pair, this.stepper.node, this.answers, this.below, this.file.report];
     this.wide.addEventListener("change", () => this.arrange());
     addEventListener("themechange", () => this.query && this.paint());
     this.bindKeys();
@@ -106,7 +108,7 @@ export class QuestionView {
     this.answers.style.setProperty("--columns", ["1fr", "1fr", ...query.choices.slice(2).map(() => "auto")].join(" "));
     fill(this.answers, query.choices.map((choice) => h(`button.answer${["cant_tell", "equal", "both_wrong"].includes(choice.value) ? ".quiet" : ""}`, { type: "button", dataset: { key: `answer-${choice.value}`, value: choice.value }, onclick: () => this.answer(choice) },
       h("kbd", {}, choice.key), h("span", {}, h("b", {}, choice.label), choice.hint ? h("small", {}, choice.hint) : null))));
-    fill(this.below, query.why ? h("p.why", {}, h("b", {}, "Why this one"), query.why) : null, h("span.push"),
+    fill(this.below, query.why ? h("p.why", {}, h("b", {}, "Why this one"), query.why) : null, h("span.push"), this.file.menu(query.run_id),
       h("button.btn.quiet.small", { type: "button", disabled: !this.canUndo(), dataset: { key: "undo-answer", tip: "Undo last answer (U)" }, onclick: () => this.onUndo() }, icon("undo"), "Undo last answer"));
   }
 

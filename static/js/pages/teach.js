@@ -18,7 +18,7 @@ const STATE_WORDS = { queued: "about to start", training: "learning", waiting_fo
 const shell = await boot();
 const state = { runs: [], run: null, queries: [], answers: [], regions: new Map(), mode: "" };
 const training = new Training({ onCancel: () => runAction("cancel").catch(complain) });
-const question = new QuestionView({ projectId: shell.projectId, regionsOf: (tool) => state.regions.get(tool) ?? [], onAnswer: answer, onUndo: () => undo().catch(complain), canUndo: () => state.answers.length > 0 });
+const question = new QuestionView({ projectId: shell.projectId, regionsOf: (tool) => state.regions.get(tool) ?? [], onAnswer: answer, onUndo: () => undo().catch(complain), canUndo: () => state.answers.length > 0, onFile: fileRead });
 
 // ---- actions -----------------------------------------------------------------------------------------------------------------
 
@@ -44,6 +44,11 @@ async function undo(given = state.answers.at(-1)) {
   state.answers = state.answers.filter((entry) => entry.id !== given.id);
   await load();
   toast("Answer taken back: the question is open again");
+}
+
+async function fileRead(report) {
+  state.answers.push(...report.applied);
+  await load();
 }
 
 function started(run) {
