@@ -109,10 +109,12 @@ def evaluation(kind: Literal["synthetic", "real"], data: Path, out: Path | None,
     """The paper's evaluation on one of the authors' sets."""
     from dataclasses import asdict
 
+    from app.benches.report import evaluation_tables, save_report
     from app.learning.study import format_study, run_study
 
     report = run_study(kind, data)
     typer.echo(format_study(report))
+    save_report(out, kind, f"The paper's evaluation on the authors' {kind} tools", data, evaluation_tables(report))
     for place in (json_file, out / f"{kind}.json" if out else None):
         if place is not None:
             place.parent.mkdir(parents=True, exist_ok=True)

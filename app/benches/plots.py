@@ -13,6 +13,12 @@ WIDTH, HEIGHT = 640, 400
 LEFT, RIGHT, TOP, BOTTOM = 64, 150, 40, 52
 TICKS = 5  # about
 
+QUANTITIES = {  # of the ablation: title and label of its plots
+    "spread": ("Spread of the samples' costs", "Deviation of cost / |w|"),
+    "shift": ("Shift of the cheapest samples at each update", "Distance of feature sums"),
+    "violations": ("Recorded orders that are not the cheapest", "Demonstrations"),
+}
+
 
 @dataclass(frozen=True)
 class Curve:

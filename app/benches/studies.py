@@ -9,9 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from app.benches.plots import Curve, Plot, as_svg, bars_as_svg
+from app.benches.plots import QUANTITIES, Curve, Plot, as_svg, bars_as_svg
+from app.benches.report import ablation_table, comparison_tables, coverage_table, effort_table, save_report
 from app.learning.ablation import Ablation, ablate
 from app.learning.comparing import (
+    TITLES,
     Score,
     format_comparison,
     learners,
@@ -29,12 +31,6 @@ from app.learning.performance_state import LearningDemonstration
 from app.sequencing.problem import problem_for
 
 Say = Callable[[str], None]
-
-QUANTITIES = {
-    "spread": ("Spread of the samples' costs", "Deviation of cost / |w|"),
-    "shift": ("Shift of the cheapest samples at each update", "Distance of feature sums"),
-    "violations": ("Recorded orders that are not the cheapest", "Demonstrations"),
-}
 
 
 def demonstrations(kind: Kind, folder: Path) -> dict[int, LearningDemonstration]:
@@ -62,7 +58,18 @@ def compare(data: Path, out: Path | None, say: Say, experts: int = 30, seed: int
         invented += _all_learners([case], ScriptedExpert(case.truth, None), seed)
     say(format_comparison(summed(invented)))
     scores += invented
-    _save(out, "compare.json", {"seed": seed, "lines": summed(scores), "scores": scores})
+    lines = summed(scores)
+    _save(out, "compare.json", {"seed": seed, "lines": lines, "scores": scores})
+    save_report(out, "compare", "Learners side by side", data, comparison_tables(lines), {"experts": experts})
+    for kind in dict.fromkeys(line.kind for line in lines):
+        found = [line for line in lines if line.kind == kind]
+        shares = {"hit": np.array([100 * line.test_success for line in found])}
+        names = tuple(line.learner for line in found)
+        _write(
+            out,
+            f"compare_{kind.replace(' ', '_')}.svg",
+            bars_as_svg(TITLES.get(kind, "Made-up experts"), "% of unseen tools", names, shares),
+        )
 
 
 def _all_learners(cases: list[Any], expert: ScriptedExpert, seed: int) -> Iterator[Score]:
@@ -81,6 +88,7 @@ def ablation(data: Path, out: Path | None, say: Say, seeds: int = 20, updates: i
         ends = [f"{b.mean[-1]:.3f} [{b.low[-1]:.3f}, {b.high[-1]:.3f}]" for b in bands.values()]
         say(f"{variant:12s}" + "".join(f"{end:>26s}" for end in ends))
     _save(out, "ablation.json", asdict(found))
+    save_report(out, "ablation", "Eq. 7 term by term", data, [ablation_table(found)], {"seeds": seeds})
     for quantity in QUANTITIES:
         _write(out, f"ablation_{quantity}.svg", as_svg(ablation_plot(found, quantity)))
 
@@ -100,6 +108,7 @@ def coverage(data: Path, out: Path | None, say: Say) -> None:
         results[kind] = study_coverage(demonstrations(kind, data))
         say(format_coverage(results[kind], kind) + "\n")
     _save(out, "coverage.json", results)
+    save_report(out, "coverage", "Coverage of four sets of demonstrations", data, [coverage_table(r, kind) for kind, r in results.items()])
 
 
 def effort(data: Path, out: Path | None, say: Say) -> None:
@@ -114,6 +123,7 @@ def effort(data: Path, out: Path | None, say: Say) -> None:
         seen, new = (f"{t.before} -> {t.after} of {t.tools}" for t in (r.trained, r.unseen))
         say(f"{r.preference:14s}  {r.answers:7d}   {seen:>14s}   {new:>12s}")
     _save(out, "effort.json", found)
+    save_report(out, "effort", "Before and after a preferred side is learned", data, [effort_table(found)])
     shares = {at: np.array([100 * _share(r, at) for r in found]) for at in ("before", "after")}
     labels = tuple(r.preference for r in found)
     _write(out, "effort.svg", bars_as_svg("Chosen order has the least effort", "% of all tools it makes a difference on", labels, shares))

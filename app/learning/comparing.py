@@ -32,6 +32,9 @@ SAME = 1e-9  # feature sums this close are equal
 OWN = 1  # stream of the learners' generators, apart from the one the made-up experts come from
 
 
+TITLES = {"synthetic": "Authors' synthetic tools, published split", "real": "Authors' real tools, one left out at a time"}
+
+
 @dataclass(frozen=True)
 class Case:
     """One set of demonstrations and what they are tested on."""
@@ -201,11 +204,10 @@ def _line(learner: str, kind: str, found: list[Score]) -> Line:
 
 def format_comparison(lines: list[Line]) -> str:
     """A table per kind."""
-    titles = {"synthetic": "Authors' synthetic tools, published split", "real": "Authors' real tools, one left out at a time"}
     text: list[str] = []
     for kind in dict.fromkeys(line.kind for line in lines):
         rows = [line for line in lines if line.kind == kind]
-        title = titles.get(kind, f"{rows[0].cases} made-up experts of random weights, synthetic tools and split")
+        title = TITLES.get(kind, f"{rows[0].cases} made-up experts of random weights, synthetic tools and split")
         text += ["", title, "learner                  train   test    hits     regret    tau   answers    cpu s"]
         text += [_row(line) for line in rows]
     return "\n".join(text[1:])

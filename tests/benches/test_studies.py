@@ -42,3 +42,18 @@ def test_ablation_saves_three_plots(tmp_path: Path):
     for name in names:
         root = ET.fromstring((tmp_path / name).read_text())
         assert len(root.findall("{http://www.w3.org/2000/svg}polyline")) == 4
+
+
+def test_every_saved_study_has_a_report(tmp_path: Path):
+    """The tables that were printed, in words, with the command that makes them again."""
+    run("coverage", "--out", str(tmp_path / "c"))
+    report = json.loads((tmp_path / "c" / "report.json").read_text())
+    assert report["command"].startswith("./dev study coverage --data ")
+    assert report["command"].endswith(f"--out {tmp_path / 'c'}")
+    assert [row[1] for row in report["tables"][0]["rows"]] == [1.0, 0.9, 0.5, 0.4]
+    run("real", "--out", str(tmp_path / "r"))
+    short, tools = json.loads((tmp_path / "r" / "report.json").read_text())["tables"]
+    assert [row[0] for row in tools["rows"]] == list(range(1, 11))
+    unseen = [row[3] for row in tools["rows"] if row[2] == "unseen"]
+    assert short["rows"][0][-1] == f"{unseen.count('yes')}/{len(unseen)}"
+    assert all(len(row) == len(table["columns"]) for table in (short, tools) for row in table["rows"])
