@@ -22,12 +22,13 @@ from app.geometry.region_table import RegionTable, read_region_table
 from app.learning.coverage import CoverageReport, coverage
 from app.learning.effort import EffortParameters, EffortStepResult, effort_step, start_effort
 from app.learning.expert import ScriptedExpert
+from app.learning.generalising import learn_unasked, on_features
 from app.learning.hits import HIT_GAP, HIT_SIZE, judge
 from app.learning.performance import performance_step, start_performance
 from app.learning.performance_state import LearningDemonstration, PerformanceParameters, StepResult
 from app.learning.policy import Policy
 from app.learning.prediction import predict
-from app.sequencing.features import Interaction
+from app.sequencing.features import FEATURE_SETS, Interaction
 from app.sequencing.problem import SequencingProblem, problem_for
 
 Kind = Literal["synthetic", "real"]
@@ -66,6 +67,9 @@ class StudyReport:
     effort_queries: int
     policy: Policy
     tools: tuple[ToolResult, ...]
+    unasked: tuple[ToolResult, ...]  # the same tools under our own learner, which got no answers
+    unasked_kind: Literal["certified", "exceptions"]  # what it chose: exact weights, or exceptions allowed for
+    left_out: tuple[int, ...]  # tables without a valid expert's sequence
     faults: tuple[tuple[int, int], ...]  # (tool, number of faults its table has)
     floor: float  # lower bound of a weight, on scaled features
 
@@ -91,7 +95,8 @@ def run_study(
         MalformedTable: A table can't be read.
     """
     parameters = parameters or PerformanceParameters()
-    tables = read_tables(kind, folder)
+    everything = read_tables(kind, folder)
+    tables = {number: table for number, table in everything.items() if table.expert is not None}
     problems = {number: problem_for(table.tool.graph, INTERACTIONS[kind]) for number, table in tables.items()}
     recorded = {number: recorded_in(number, table) for number, table in tables.items()}
     trained = [number for number in tables if number in TRAINED_ON[kind]]
@@ -105,6 +110,9 @@ def run_study(
     features = demonstrations[0].problem.features
     policy = Policy(result.weights, features.name, features.version, INTERACTIONS[kind], effort.effort_weights, result.state.identifiable)
     tools = tuple(_evaluate(i, problems[i], recorded[i], i in trained, policy) for i in tables)
+    own = learn_unasked(demonstrations, seed)
+    known = {**FEATURE_SETS, features.name: features}
+    under = problems if own.certificate else {i: on_features(p, known[own.policy.features]) for i, p in problems.items()}
     return StudyReport(
         kind=kind,
         seed=seed,
@@ -118,7 +126,10 @@ def run_study(
         effort_queries=len(effort_answers),
         policy=policy,
         tools=tools,
-        faults=tuple((i, len(table.faults)) for i, table in tables.items() if table.faults),
+        unasked=tuple(_evaluate(i, under[i], recorded[i], i in trained, own.policy) for i in tables),
+        unasked_kind="certified" if own.certificate else "exceptions",
+        left_out=tuple(i for i in everything if i not in tables),
+        faults=tuple((i, len(table.faults)) for i, table in everything.items() if table.faults),
         floor=parameters.floor,
     )
 

@@ -36,6 +36,18 @@ def format_study(report: StudyReport) -> str:
         "weight of each feature (a feature marked * can't be identified from these training tools)",
         *_weights(report),
     ]
+    kept = [t for t in report.unasked if t.trained]
+    new = [t for t in report.unasked if not t.trained]
+    how = {"certified": "exact weights, certified", "exceptions": "exceptions allowed for"}[report.unasked_kind]
+    lines += [
+        "",
+        f"Our own learner, no answers ({how}): hits train {_hits(kept)}, test {_hits(new)}; "
+        f"mean Kendall tau train {_tau(kept)}, test {_tau(new)}",
+        "tool  regions  split  hit  class size   cost gap   tau",
+        *(_row(t) for t in report.unasked),
+    ]
+    if report.left_out:
+        lines += ["", f"Left out, without a valid recorded order: {', '.join(map(str, report.left_out))}."]
     if report.faults:
         told = ", ".join(f"tool {number}: {count}" for number, count in report.faults)
         lines += ["", f"Faults named while reading the tables: {told}."]

@@ -70,3 +70,13 @@ def test_printed_study_has_every_tool(synthetic: StudyReport):
 def test_folder_without_tables_is_refused(tmp_path: Path):
     with pytest.raises(NotFound, match="Mold_1_Data"):
         run_study("real", tmp_path)
+
+
+def test_our_own_learner_without_answers(synthetic: StudyReport, real: StudyReport) -> None:
+    """Exact weights for the made-up expert; exceptions allowed for where people demonstrated."""
+    found = {
+        kind: (r.unasked_kind, sum(t.hit for t in r.unasked if t.trained), sum(t.hit for t in r.unasked if not t.trained))
+        for kind, r in (("synthetic", synthetic), ("real", real))
+    }
+    assert found == {"synthetic": ("certified", 6, 4), "real": ("exceptions", 5, 3)}
+    assert "Our own learner, no answers (exceptions allowed for): hits train 5/6, test 3/4" in format_study(real)
