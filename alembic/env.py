@@ -5,9 +5,10 @@ from sqlmodel import SQLModel
 
 from alembic import context
 from app.settings import Settings
-from app.storage import tables
+from app.storage import process_tables, tables
 
-assert tables  # imported for its metadata
+assert tables
+assert process_tables  # imported for its metadata
 
 
 def run(connection: object) -> None:

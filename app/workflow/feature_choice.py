@@ -10,7 +10,8 @@ from app.sequencing.choice import chosen_features, features_named
 from app.sequencing.contract import contract_faults
 from app.sequencing.features import FEATURE_SETS, FeatureSet
 from app.sequencing.plugins import OwnFeature, read_own_feature
-from app.storage.tables import OwnFeatureRow, Project, Segmentation, ToolRow
+from app.storage.process_tables import OwnFeatureRow
+from app.storage.tables import Project, Segmentation, ToolRow
 from app.workflow.lookup import found, standing
 
 FOLDER = "features"  # in the data folder: one Python file per own feature

@@ -13,7 +13,8 @@ from app.sequencing.features import FEATURE_SETS, FeatureSet
 from app.sequencing.plugins import OwnFeature
 from app.storage import emit
 from app.storage.identity import now
-from app.storage.tables import OwnFeatureRow, ProcessTemplateRow, Project
+from app.storage.process_tables import OwnFeatureRow, ProcessTemplateRow
+from app.storage.tables import Project
 from app.workflow.context import Context
 from app.workflow.feature_choice import FOLDER, base_set, examined, own_features, own_files, project_features
 from app.workflow.lookup import check_version, current_segmentation, found, present, refuse_while_training, tools_of
