@@ -7,6 +7,7 @@ transitions. `never_next` depends on the region worked on last.
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -57,7 +58,9 @@ def resolve(constraints: Constraints | None, n: int, names: Sequence[str] | None
         InvalidInput: A region that is not there, or named twice where once is meant.
         ContradictoryConstraints: Names the smallest set of wishes that can't hold together.
     """
-    c, called = constraints or Constraints(), tuple(names or region_letters(n))
+    if constraints is None:
+        return _unconstrained(n)
+    c, called = constraints, tuple(names or region_letters(n))
     _check_regions(c, n, called)
     out = {*c.skip, *c.done}
     free = tuple(a for a in range(n) if a not in out)
@@ -76,6 +79,13 @@ def resolve(constraints: Constraints | None, n: int, names: Sequence[str] | None
     for a, b in c.never_next:
         never[a, b] = True
     return Resolved(before, never, free, c.skip, c.done)
+
+
+@lru_cache(maxsize=128)
+def _unconstrained(n: int) -> Resolved:
+    nothing = np.zeros((n, n), np.bool_)
+    nothing.flags.writeable = False
+    return Resolved(nothing, nothing, tuple(range(n)), (), ())
 
 
 def check_order(order: Sequence[int], resolved: Resolved) -> list[tuple[int, int]]:

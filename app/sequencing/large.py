@@ -8,18 +8,23 @@ seen by a re-insertion; it is only kept when the whole cost with them has not gr
 Deterministic for a seed; the best order so far only ever gets cheaper.
 """
 
+import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from app.geometry.tool import Array
+from app.errors import ContradictoryConstraints
+from app.geometry.tool import Array, region_letters
 from app.sequencing.beam import beam
-from app.sequencing.constraints import Resolved, resolve
+from app.sequencing.constraints import Resolved, listed, resolve
 from app.sequencing.problem import SequencingProblem
 from app.sequencing.transitions import Model, is_compiled, model_of
 from app.sequencing.window import Order, order_cost, reinsert, reinsert_by_values
 
+ROUNDS = 5  # of moving blocks where costs depend on the region before
+BLOCK = 3  # regions moved elsewhere together then
+AVOIDING = 20_000  # starts of orders looked at for one without forbidden neighbours
 IMPROVES = 1e-9  # relative gain below which a move counts as no improvement
 
 Report = Callable[[float, float], None]  # (share of the budget used, cost of the best order so far)
@@ -52,6 +57,7 @@ class Search:
         self.model: Model | None = model_of(problem, self.w) if is_compiled(problem.features) else None
         self.between, self.start = between_costs(problem, w)
         self.before, self.never_next = resolved.before, resolved.never_next
+        self.chained = bool(self.between.any() or self.start.any())  # costs depend on the region before
         self.done, self.free = np.zeros(problem.n, np.bool_), np.array(resolved.free, np.int64)
         self.done[list(resolved.done)] = True
         self.last_done = resolved.done[-1] if resolved.done else -1
@@ -133,6 +139,23 @@ class Search:
             if cost > before - IMPROVES * max(1e-300, abs(before)):
                 return cost, order
 
+    def relocated(self, cost: float, order: Order) -> tuple[float, Order]:
+        """Blocks of up to BLOCK regions moved elsewhere while the whole cost falls: sees what re-insertion can't."""
+        n = len(order)
+        for _ in range(ROUNDS):
+            before = cost
+            for i, size in itertools.product(range(n), range(1, min(BLOCK, n) + 1)):
+                block, rest = order[i : i + size], np.concatenate([order[:i], order[i + size :]])
+                for at in range(len(rest) + 1):
+                    trial = np.concatenate([rest[:at], block, rest[at:]])
+                    value = self.cost(trial)
+                    if value < cost - IMPROVES * abs(cost) and self.allowed(trial):
+                        cost, order = value, trial
+                        break
+            if cost == before:
+                break
+        return cost, order
+
     def move(self, order: Order, effort: Effort) -> Order:
         """Take some regions out, near each other in the order or on the tool, and put them back best."""
         n, kind = len(order), self.rng.random()
@@ -152,6 +175,26 @@ class Search:
         near = near[(near >= 0) & (np.abs(near - at) <= effort.reach // 2)][: k + 5]
         taken = np.sort(self.rng.choice(near, min(k, len(near)), replace=False))
         return self.reinsert(order, max(0, int(taken[0]) - 2), min(n, int(taken[-1]) + 3), taken)
+
+    def avoiding(self, order: tuple[int, ...]) -> Order | None:
+        """An order without forbidden neighbours, of the first regions of `order` where possible; None if none turns up.
+
+        Depth-first; a region that few may follow comes before others.
+        """
+        rank = {a: i for i, a in enumerate(order)}
+        strict = {a: int(self.never_next[:, a].sum() + self.never_next[a].sum()) for a in order}
+        start: list[int] = [self.last_done] if self.last_done >= 0 else []
+        stack = [start]
+        for _ in range(AVOIDING):
+            if not stack:
+                return None
+            chain = stack.pop()
+            waiting = [a for a in order if a not in chain]
+            if not waiting:
+                return np.array(chain[len(start) :], np.int64)
+            ready = [a for a in waiting if not self.before[waiting, a].any() and not (chain and self.never_next[chain[-1], a])]
+            stack.extend([*chain, a] for a in sorted(ready, key=lambda a: (strict[a], -rank[a])))
+        return None
 
     def shake(self, order: Order) -> Order:
         """A block moved elsewhere, perhaps turned round; the order itself where that is not allowed."""
@@ -184,6 +227,9 @@ def best_found(
         effort: How long to search; by default as suits the features.
         should_stop: Asked after every move; the best order so far is returned when it says so.
         report: Told after every gain and at the end.
+
+    Raises:
+        ContradictoryConstraints: No order without forbidden neighbours turned up; names those that stand in the way.
     """
     r = resolved or resolve(None, problem.n)
     search = Search(problem, problem.check_weights(w), r, seed)
@@ -191,19 +237,38 @@ def best_found(
     if not len(search.free):
         return r.done
     found: list[tuple[float, tuple[int, ...]]] = []
+    stopped = False
     for start in _starts(search, problem, w, r, effort):
         cost, order = search.descend(start, effort.stretch)
         if not found or cost < min(found)[0]:
             report(0.0, cost)
         found.append((cost, tuple(order.tolist())))
-        if should_stop():
-            return r.done + min(found)[1]
+        stopped = should_stop()
+        if stopped:
+            break
     best = sorted(set(found))[: effort.kept]
     lowest = best[0]
-    for turn, begin in enumerate(best):
+    for turn, begin in enumerate(() if stopped else best):
         lowest = min(lowest, _wander(search, begin, effort, (turn, len(best)), lowest[0], should_stop, report))
+    if search.chained and not stopped:
+        cost, order = search.relocated(lowest[0], np.array(lowest[1], np.int64))
+        lowest = (cost, tuple(order.tolist()))
+    if search.broken(np.array(lowest[1])):
+        lowest = _mended(search, lowest[1], effort)
     report(1.0, lowest[0])
     return r.done + lowest[1]
+
+
+def _mended(search: Search, order: tuple[int, ...], effort: Effort) -> tuple[float, tuple[int, ...]]:
+    """An order near this one that has no forbidden neighbours, made cheaper by stretches."""
+    start = search.avoiding(order)
+    if start is None:
+        chain = (*([search.last_done] if search.last_done >= 0 else []), *order)
+        letters = region_letters(search.n)
+        pairs = [f"{letters[b]} never directly after {letters[a]}" for a, b in itertools.pairwise(chain) if search.never_next[a, b]]
+        raise ContradictoryConstraints(f"No order was found that keeps {listed(pairs)}. Take one of these away.")
+    cost, mended = search.descend(start, effort.stretch)
+    return cost, tuple(mended.tolist())
 
 
 def between_costs(problem: SequencingProblem, w: Array) -> tuple[Array, Array]:

@@ -3,9 +3,11 @@
 import numpy as np
 
 from app.geometry.tool import RegionGraph
+from app.sequencing.bounds import lower_bound
 from app.sequencing.classes import best_classes, equivalent_sequences
 from app.sequencing.constraints import Constraints, resolve
 from app.sequencing.exact import costs_to_go, form_for, model_for, parallel_is_safe
+from app.sequencing.large import Effort, best_found
 from app.sequencing.problem import problem_for
 from app.sequencing.shortest import Ends, cost_to_go, shortest_sequence
 
@@ -28,6 +30,8 @@ def warm_up() -> None:
     best_classes(problem, w, 3)
     equivalent_sequences(problem, best.sequence)
     cost_to_go(problem, w)
+    best_found(problem, w, effort=Effort(moves=2, beams=(1,), sweeps=False))
+    lower_bound(problem, w, best.cost, steps=2)
     if parallel_is_safe():
         model = model_for(problem, resolve(None, n))
         costs_to_go(model, form_for(model, w), threads=True)
