@@ -28,6 +28,7 @@ from app.api import (
     segmentations,
     server,
     sessions,
+    studies,
     tools,
 )
 from app.api.guard import Guard
@@ -40,7 +41,22 @@ from app.workflow.projects import get_project
 VERSION = "0.1.0"
 STATIC = ROOT / "static"
 HOSTS = ("127.0.0.1", "localhost", "::1")
-NOUNS = (projects, tools, segmentations, drafts, demonstrations, coverage, process, runs, queries, policies, playbacks, sessions, events)
+NOUNS = (
+    projects,
+    tools,
+    segmentations,
+    drafts,
+    demonstrations,
+    coverage,
+    process,
+    runs,
+    queries,
+    policies,
+    playbacks,
+    studies,
+    sessions,
+    events,
+)
 DESCRIPTION = "Learns in which order an expert works on the regions of a part, and shows a robot doing it on another part."
 PROBLEMS: dict[int | str, dict[str, Any]] = {
     "4XX": {"model": errors.Problem, "description": "Refused; the body says why and what is accepted."},
@@ -108,6 +124,12 @@ pages = APIRouter(include_in_schema=False)
 def projects_page() -> Response:
     """The list of projects."""
     return page_file("projects")
+
+
+@pages.get("/studies")
+def studies_page() -> Response:
+    """The study reports."""
+    return page_file("studies")
 
 
 @pages.get("/p/{project_id}/{page}")

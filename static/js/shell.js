@@ -61,8 +61,8 @@ function railLink(stage, project, here) {
 export function drawRail(project, here) {
   const rail = document.querySelector(".rail");
   fill(rail, h("ul", {}, h("li", {}, h("a", { href: "/", dataset: { key: "all" }, "aria-current": here === "projects" ? "page" : null }, "All projects"))),
-    project || here !== "projects" ? [h("p.label.rail-project", {}, project?.name ?? "\u00a0"), h("div.line", {}, STAGES.map((stage) => railLink(stage, project, here)))] : null,
-    h("div.foot", {}, project ? h("a", { href: pageAddress(project.id, "process"), dataset: { key: "process" }, "aria-current": here === "process" ? "page" : null }, "What counts") : null, h("a", { href: "/docs", dataset: { key: "docs" } }, "REST interface")));
+    project || projectFromAddress() ? [h("p.label.rail-project", {}, project?.name ?? "\u00a0"), h("div.line", {}, STAGES.map((stage) => railLink(stage, project, here)))] : null,
+    h("div.foot", {}, project ? h("a", { href: pageAddress(project.id, "process"), dataset: { key: "process" }, "aria-current": here === "process" ? "page" : null }, "What counts") : null, h("a", { href: "/studies", dataset: { key: "studies" }, "aria-current": here === "studies" ? "page" : null }, "Studies"), h("a", { href: "/docs", dataset: { key: "docs" } }, "REST interface")));
 }
 
 export function statusOf(project) {

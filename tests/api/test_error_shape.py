@@ -39,7 +39,16 @@ UPLOADS = {
     "import_region_table": ("x.csv", REAL_TABLE.encode()),
     "read_answers": ("x.csv", b"query id,answer\n"),
 }
-WITHOUT_IDS = {"region_table_template", "list_projects", "create_project", "create_sample_project", "list_templates", "healthz", "readyz"}
+WITHOUT_IDS = {
+    "region_table_template",
+    "list_projects",
+    "create_project",
+    "create_sample_project",
+    "list_templates",
+    "list_studies",
+    "healthz",
+    "readyz",
+}
 
 
 def operations(client: TestClient) -> list[tuple[str, str, dict[str, Any]]]:
