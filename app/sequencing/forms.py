@@ -287,19 +287,6 @@ def step_costs(form: Form, s: int, out: Array) -> None:
 
 
 @nb.njit(cache=True, nogil=True)
-def path_cost(form: Form, after_last: Array, order: Ints) -> float:
-    """Cost of an order of the free regions in float64; `after_last` (N + 1, N) or (0, 0) as in `last`."""
-    s, before, total, out = 0, len(order), 0.0, np.empty(len(order))
-    for a in order:
-        step_costs(form, s, out)
-        total += out[a]
-        if len(after_last):
-            total += after_last[before, a]
-        s, before = s | 1 << a, a
-    return total
-
-
-@nb.njit(cache=True, nogil=True)
 def first_test(form: Form, u: int, a: int, members: Ints) -> int:
     """The first test of cascade u that a finished region passes for region a."""
     for k in range(form.reached[u, a]):

@@ -15,7 +15,7 @@ from app.sequencing import kernels
 from app.sequencing.block import SMALLEST, Single
 from app.sequencing.constraints import Constraints, Resolved, listed, resolve
 from app.sequencing.exact import Limits, Model, costs_to_go, form_for, magnitude, model_for, why_not_exact
-from app.sequencing.forms import Form, path_cost, step_costs
+from app.sequencing.forms import Form, step_costs
 from app.sequencing.large import best_found
 from app.sequencing.last import LAST_LIMIT, after_last, costs_to_go_by_last
 from app.sequencing.nearly import Nearly, explore
@@ -194,7 +194,7 @@ def shortest_sequence(
         order, more = _settle(solution, tie_break, ties)
         method += more
     sequence = solution.named(order)
-    cost = problem.cost_of(w, sequence) if resolved.done else path_cost(solution.form, solution.after, np.array(order, np.int64))
+    cost = problem.cost_of(w, sequence)
     return Shortest(sequence, cost, ties, proved=True, method=method, bound=cost)
 
 
