@@ -6,6 +6,7 @@ from typing import Any
 
 from sqlmodel import Session
 
+from app.errors import InvalidInput
 from app.geometry.tool import Tool
 from app.jobs.dispatcher import Handler
 from app.jobs.worker import Report
@@ -62,7 +63,15 @@ def prepare(values: Values, session: Session, job: JobRow) -> Order | None:
 
 
 def compute(order: Order, report: Report) -> Result:
-    """Simulate; pure."""
+    """Simulate; pure.
+
+    Raises:
+        InvalidInput: The plan leaves regions out.
+    """
+    left_out = [region.name for a, region in enumerate(order.tool.regions) if a not in order.sequence]
+    if left_out:
+        names = ", ".join(left_out)
+        raise InvalidInput(f"This order leaves out {names}. The arm's preview needs every region: make a plan that leaves none out.")
     playback = simulate(order.tool, order.sequence, order.parameters, report)
     return Result(playback_to_bytes(playback), summary(playback, order.sequence))
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from sqlmodel import Session, col, select
 
+from app.errors import IncompleteSequence
 from app.learning.effort_features import EFFORT_COLUMNS
 from app.learning.policy import Policy
 from app.learning.prediction import Prediction, predict
@@ -109,15 +110,24 @@ def what_if(ctx: Context, plan_id: str, sequence: list[int]) -> Json:
     def query(session: Session) -> Json:
         row = found(session, Plan, plan_id, "plan")
         cut = found(session, Segmentation, row.segmentation_id, "segmentation")
-        order = check_sequence(sequence, cut.region_count)
+        order = _of_the_same_regions(sequence, row.sequence, cut.region_count)
         policy = policy_value(found(session, PolicyRow, row.policy_id, "policy"))
         problem = ctx.values.problem(session, cut, policy.interactions, stored_features(session, policy.features))
-        parts = policy.weights * (problem.feature_sum(order) - problem.steps_of(row.sequence).sum(axis=0))
+        parts = policy.weights * (problem.steps_of(order).sum(axis=0) - problem.steps_of(row.sequence).sum(axis=0))
         delta = float(parts.sum())
         features = [{"label": column.label, "delta": float(part)} for column, part in zip(problem.columns, parts, strict=True)]
         return {"cost": row.result["cost"] + delta, "delta": delta, "features": features}
 
     return ctx.store.read(query)
+
+
+def _of_the_same_regions(sequence: list[int], planned: list[int], count: int) -> tuple[int, ...]:
+    """The sequence, if it holds what the plan holds: all regions, or all that are not left out."""
+    if len(planned) == count:
+        return check_sequence(sequence, count)
+    if sorted(sequence) != sorted(planned):
+        raise IncompleteSequence("The order must hold every region of the plan once, and none of those left out.")
+    return tuple(sequence)
 
 
 def policy_json(session: Session, row: PolicyRow) -> Json:

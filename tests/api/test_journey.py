@@ -1,5 +1,7 @@
 """A project from the first look to the robot, by REST alone."""
 
+import re
+import time
 from typing import Any
 
 import pytest
@@ -134,6 +136,9 @@ def test_teaching_to_the_robot(api: Api, sample: dict[str, Any]) -> None:
     refused = {"tool_id": tool["id"], "constraints": {"before": [[[0], [1]], [[1], [0]]]}}
     assert "No order can have" in api.post(f"/policies/{policy['id']}/plans", refused, status=422)["detail"]
 
+    check_left_out(api, policy["id"], tool["id"])
+    check_thirty_regions(api, project, policy["id"])
+
     playback = api.post(f"/plans/{plan['id']}/playbacks", {}, status=202)
     playback = api.until(f"/playbacks/{playback['id']}", lambda row: row["state"] in ("ready", "failed"), seconds=200)
     assert playback["state"] == "ready", playback
@@ -156,3 +161,31 @@ def test_undo_of_an_answer_asks_again(api: Api, sample: dict[str, Any]) -> None:
         assert api.get(f"/queries/{query['id']}")["answer"]["value"] == "similar"
         reopened = api.post(f"/answers/{answer['id']}/undo", status=200)
         assert (reopened["state"], reopened["answer"]) == ("open", None)
+
+
+def check_left_out(api: Api, policy: str, tool: str) -> None:
+    """A plan without region 1: its orders compare with each other, and the robot says what is missing."""
+    plan = api.post(f"/policies/{policy}/plans", {"tool_id": tool, "constraints": {"skip": [1]}})
+    assert 1 not in plan["sequence"]
+    other = api.post(f"/plans/{plan['id']}/what-if", {"sequence": plan["sequence"][::-1]}, status=200)
+    assert other["delta"] >= -1e-9
+    whole = {"sequence": [*plan["sequence"], 1]}
+    assert "left out" in api.post(f"/plans/{plan['id']}/what-if", whole, status=422)["detail"]
+    playback = api.post(f"/plans/{plan['id']}/playbacks", {}, status=202)
+    playback = api.until(f"/playbacks/{playback['id']}", lambda row: row["state"] in ("ready", "failed"))
+    assert playback["error"]["detail"].startswith("This order leaves out B.")
+
+
+def check_thirty_regions(api: Api, project: str, policy: str) -> None:
+    """A grid of 30 regions as a table: too many to prove an order, so the plan says how far off it may be."""
+    rows = [f"r{i},{400 * (i % 6)},{300 * (i // 6)},400,300,{40 + 7 * (i * 5 % 11)},{i * 7 % 9 - 4}" for i in range(30)]
+    table = "\n".join(["region,x_mm,y_mm,width_mm,depth_mm,height_mm,curvature_per_m", *rows])
+    tool = api.upload(f"/projects/{project}/tools/region-table", "thirty.csv", table.encode())
+    tool = api.until(f"/tools/{tool['id']}", lambda row: row["state"] == "ready")
+    began = time.process_time()
+    plan = api.post(f"/policies/{policy}/plans", {"tool_id": tool["id"]})
+    assert time.process_time() - began < 20  # seconds, compilers included
+    assert sorted(plan["sequence"]) == list(range(30))
+    assert plan["proved"] is False
+    assert plan["bound"] <= plan["cost"]
+    assert re.fullmatch(r"Best found, at most [0-9.]+ % above the optimum", plan["sureness"])

@@ -10,6 +10,7 @@ import { boot, pageAddress, query, remember, showFault } from "../shell.js";
 import { Stepper } from "../stepper.js";
 import { complain } from "../toasts.js";
 import { View3D } from "../view3d.js";
+import { Wishes } from "../wishes.js";
 import { number, plural } from "../words.js";
 
 const CAUSES = 5; // named in the chart; the rest is one grey bar
@@ -26,6 +27,7 @@ const parts = {
   tiles: h("div.tiles", { role: "group", "aria-label": "Order; move a region with Alt and the arrows to see what it would cost" }),
   weights: h("dialog.card.pad.keys.weights"),
 };
+const wishes = new Wishes({ onChange: plan });
 const state = { policies: [], policy: null, tools: [], tool: null, plan: null, order: [], whatif: null, view: null, stepper: null, chart: null };
 
 // ---- chart --------------------------------------------------------------------------------------------------------------------
@@ -140,7 +142,7 @@ function paintProof() {
   const { plan } = state;
   parts.proof.dataset.proved = String(plan.proved);
   fill(parts.proof, icon(plan.proved ? "shield" : "warn"), h("div", {}, h("b", {}, plan.sureness),
-    h("span.small.muted", { dataset: plan.proved ? {} : { tip: plan.method } }, plan.proved ? `Cheapest of all ${plan.orders} orders, in ${number(plan.milliseconds, 2)} ms` : `${plural(plan.sequence.length, "region")} are too many to look at every order${plan.bound === null ? "" : `; none costs less than ${number(plan.bound)}`}.`)));
+    h("span.small.muted", { dataset: plan.proved ? {} : { tip: plan.method } }, plan.proved ? `Cheapest of all ${plan.constraints ? "orders that keep what you asked" : `${plan.orders} orders`}, in ${number(plan.milliseconds, 2)} ms` : `${plural(plan.sequence.length, "region")} are too many to look at every order${plan.bound === null ? "" : `; none costs less than ${number(plan.bound)}`}.`)));
   const fact = (term, value, tip = null) => h("div.fact", { dataset: tip ? { tip } : {} }, h("dt", {}, term), h("dd", {}, value));
   fill(parts.facts, fact("Cost", number(plan.cost), "C = w · Φ, added along the order; low is good"),
     fact("Equally cheap", plan.ties === 1 ? "this one only" : `${Number(plan.ties).toLocaleString("en")} orders`, "Orders in the lowest cost class (relative 1e-7)"),
@@ -175,12 +177,26 @@ function drawCrumb() {
 async function open(tool) {
   state.tool = tool;
   remember("tool", tool.id);
-  state.plan = await post(`/policies/${state.policy.id}/plans`, { tool_id: tool.id });
+  const [regions, asked] = await Promise.all([all(`/tools/${tool.id}/regions`), lastAsked(tool)]);
+  const names = [];
+  for (const region of regions) names[region.id] = region.name;
+  wishes.reset(names, asked);
+  drawCrumb();
+  await plan(wishes.asked);
+}
+
+async function plan(constraints) {
+  state.plan = await post(`/policies/${state.policy.id}/plans`, { tool_id: state.tool.id, constraints });
   state.order = [...state.plan.sequence];
   state.whatif = null;
   state.stepper.reset(state.order.length);
-  drawCrumb();
   paint();
+}
+
+// What the newest plan of this tool respects: wishes outlive a reload.
+async function lastAsked(tool) {
+  const plans = await all(`/policies/${state.policy.id}/plans`);
+  return plans.find((entry) => entry.tool_id === tool.id)?.constraints ?? null;
 }
 
 function paint() {
@@ -210,9 +226,10 @@ async function start() {
   state.stepper = new Stepper({ n: 1, onStep: showOrder, name: "Play the order" });
   parts.stage.append(h("div.bl", {}, h("div.play", {}, state.stepper.node)));
   state.stepper.node.style.flex = "1";
-  fill(shell.main, parts.head, h("div.policy-upper", {}, parts.stage, h("aside.card.fill", {}, parts.proof, parts.facts, parts.whatif)),
+  fill(shell.main, parts.head, h("div.policy-upper", {}, parts.stage, h("aside.card.fill", {}, parts.proof, parts.facts, wishes.node, parts.whatif)),
     h("section.card.policy-lower", { "aria-label": "Why this order" }, h("div.bar-head", {}, h("h2.nowrap", {}, "Why this order"), h("span.small.muted.nowrap", {}, "cost per step"), parts.legend), parts.chart, parts.tiles, h("p.underline", {}, "Drag a region to another place, or use Alt with the arrows.")), parts.weights);
   state.view = new View3D(parts.stage, { projectId: shell.projectId, name: "policy" });
+  state.view.onPicked((region) => wishes.pick(region));
   movable();
   const wanted = query("tool");
   await open(state.tools.find((tool) => tool.id === wanted) ?? state.tools.find((tool) => !tool.demonstrated) ?? state.tools[0]);
