@@ -3,6 +3,9 @@
 Only for tools whose regions form a grid in plan view, where a bounding box is a range of rows and columns.
 """
 
+# pyright: reportAttributeAccessIssue=false, reportMissingImports=false
+# didppy is a compiled module without type information.
+
 from typing import Any
 
 import didppy as dp

@@ -68,7 +68,7 @@ FAMILIES: dict[str, Callable[[int], RegionGraph]] = {"saddle": saddle, "waves": 
 def weights(problem: SequencingProblem, seed: int | None) -> Array:
     """All features of one size on average over random orders; with a seed each times 0.1 to 1, as the learner's are."""
     rng = np.random.default_rng(0)
-    sums = np.mean([np.abs(problem.feature_sum(rng.permutation(problem.n))) for _ in range(30)], axis=0)
+    sums = np.mean([np.abs(problem.feature_sum(rng.permutation(problem.n).tolist())) for _ in range(30)], axis=0)
     drawn = np.ones(len(sums)) if seed is None else np.random.default_rng(seed).uniform(0.1, 1, len(sums))
     return drawn * np.where(sums > 1e-9, problem.n / np.maximum(sums, 1e-9), 1.0)
 

@@ -178,7 +178,7 @@ def dijkstra(problem: SequencingProblem, w: Array) -> tuple[float, float]:
         graph.add_weighted_edges_from((s, s | 1 << a, table[s, a] + lift) for a in range(n) if not s >> a & 1)
     started = time.process_time()
     length, _ = nx.single_source_dijkstra(graph, 0, (1 << n) - 1)
-    return length - n * lift, time.process_time() - started
+    return float(length) - n * lift, time.process_time() - started  # pyright: ignore[reportArgumentType]
 
 
 def _ratios(options: Options) -> Iterator[Figure]:

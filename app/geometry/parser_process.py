@@ -42,7 +42,7 @@ def parse_apart(path: Path, kind: str, file_name: str) -> ParsedFile:
         folder = Path(name)
         request = {"folder": name, "input": str(path.resolve()), "kind": kind, "seconds": WALL_SECONDS}
         end = _ask(json.dumps(request).encode() + b"\n")
-        if (folder / "error.json").exists():
+        if end == b"done" and (folder / "error.json").exists():  # a child that crashed may have left half of one
             error = json.loads((folder / "error.json").read_text())
             raise getattr(errors, error["error"])(f"{file_name}: {error['detail']}")
         if end == b"done" and (folder / "result.npz").exists():

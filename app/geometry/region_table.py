@@ -23,6 +23,7 @@ from app.geometry.table_text import entries, number, outline_points
 from app.geometry.tool import Array, RegionGraph, Tool
 
 OUTSIDE = "O"  # the tool's outer edge in a list of neighbours
+LEVEL = 1e-9  # rad: two regions that differ less in tilt are equally tilted
 
 
 @dataclass(frozen=True)
@@ -214,7 +215,8 @@ def _synthetic_graph(rows: list[Row], borders: list[Border]) -> RegionGraph:
     size, turn = np.array([_size(row, p) for row, p in zip(rows, points, strict=True)]), np.radians([row.number_in("turn") for row in rows])
     difference = np.abs(turn[:, None] - turn[None, :])
     entries = np.array([[border.listed.count(b) for b in range(n)] for border in borders], float)
-    angle = np.where(difference > 0, entries / np.where(difference > 0, difference, 1.0), 0.0)
+    turned = difference > LEVEL
+    angle = np.where(turned, entries / np.where(turned, difference, 1.0), 0.0)
     half = size.sum(axis=1)[:, None]
     return RegionGraph(
         source="synthetic",

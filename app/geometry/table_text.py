@@ -23,7 +23,7 @@ def decode_table(content: bytes, file_name: str) -> str:
         except UnicodeDecodeError:
             continue
         if not re.search(r"[\x00-\x08\x0e-\x1f]", text):
-            return text
+            return text.replace("\u00a0", " ")  # spreadsheets put it where people typed a space
     raise MalformedTable(f"{file_name} is not text. Expected a region table as CSV or JSON in UTF-8.")
 
 

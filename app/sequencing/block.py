@@ -15,6 +15,9 @@ Blocks whose high bits hold the same number of regions don't need each other, so
 deals out superblocks (all blocks with the same topmost bits) layer by layer.
 """
 
+# pyright: reportArgumentType=false, reportCallIssue=false
+# Compiled code: the checker takes elements of arrays for numpy's own scalars and doesn't know all of numba's options.
+
 from typing import NamedTuple
 
 import numba as nb

@@ -14,6 +14,9 @@ region and so goes to the state. The cost is F_0 plus weighted products of other
 Only regions still to be ordered (`free`) are numbered here; finished and skipped ones go into the constants.
 """
 
+# pyright: reportIncompatibleMethodOverride=false
+# Named tuples with a field `count`, because that is what compiled code takes.
+
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 

@@ -7,6 +7,9 @@ the next costs) is answered on this graph, which is small unless nearly everythi
 A node is a state, or a state and the region worked on last where costs depend on it. Its edges are stored side by side.
 """
 
+# pyright: reportReturnType=false
+# Compiled code: the checker can't follow the types of the growing arrays.
+
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -5,6 +5,9 @@ is (how many of those are finished, which of the taken ones are finished): a dyn
 region of the stretch is taken, this is the best order of the stretch (the window).
 """
 
+# pyright: reportArgumentType=false, reportPossiblyUnboundVariable=false
+# Compiled code: the checker takes elements of arrays for arrays.
+
 import numba as nb
 import numpy as np
 from numpy.typing import NDArray
