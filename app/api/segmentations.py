@@ -8,6 +8,7 @@ from pydantic import Field, FiniteFloat
 from app.api.dependencies import Body, Ctx, Json, RegionId, Row, located, tagged
 from app.api.idempotency import ActionRoute, IdempotencyKey
 from app.api.tools import Tool
+from app.geometry.segmentation import MOST_TARGET
 from app.workflow import segmentations as workflow
 from app.workflow import tools
 
@@ -49,7 +50,7 @@ class SegmentationOrder(Body):
         Id | None, Field(description="The cut the edit was made on; refused when it is no longer the current one.")
     ] = None
     now: Annotated[bool, Field(description="Answer at once from the kept merges instead of in the background.")] = False
-    target: Annotated[int, Field(ge=1, le=200, description="Regions wanted; left out: decided by the tolerance.")] | None = None
+    target: Annotated[int, Field(ge=1, le=MOST_TARGET, description="Regions wanted; left out: decided by the tolerance.")] | None = None
     tolerance: Annotated[float, Field(gt=0, lt=1, description="Fit error allowed, relative to the part's size.")] | None = None
     minimum_area: Annotated[float, Field(ge=0, le=0.5, description="Smaller shares of the working surface go to a neighbour.")] | None = (
         None
