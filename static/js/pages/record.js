@@ -318,9 +318,8 @@ async function start() {
   fill(shell.main, parts.head, parts.body);
   state.view = new View3D(parts.stage, { projectId: shell.projectId, name: "record" });
   state.saved = new SavedList({ projectId: shell.projectId, onReplay: (demonstration) => showSaved(demonstration).catch(complain), onAgain: (demonstration) => recordAgain(demonstration).catch(complain), onChange: () => paint() });
-  await Promise.all([open(tool.id), state.saved.load()]);
+  await Promise.all([open(tool.id).then(bindAll), state.saved.load()]); // whoever sees the regions may press their letters at once
   paint();
-  bindAll();
   return undefined;
 }
 
