@@ -4,11 +4,12 @@ import asyncio
 import weakref
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from enum import Enum
 from typing import Any
+from urllib.parse import quote
 
 from fastapi import APIRouter, FastAPI, Request
-from fastapi.responses import FileResponse, Response
+from fastapi.responses import FileResponse, RedirectResponse, Response
+from starlette.exceptions import HTTPException
 from starlette.middleware.gzip import GZipMiddleware
 from starlette.staticfiles import StaticFiles
 
@@ -57,23 +58,12 @@ NOUNS = (
     sessions,
     events,
 )
+PAGES = ("tools", "record", "process", "coverage", "teach", "policy", "robot")
 DESCRIPTION = "Learns in which order an expert works on the regions of a part, and shows a robot doing it on another part."
 PROBLEMS: dict[int | str, dict[str, Any]] = {
     "4XX": {"model": errors.Problem, "description": "Refused; the body says why and what is accepted."},
     "5XX": {"model": errors.Problem, "description": "The server failed."},
 }
-
-
-class PageName(Enum):
-    """The pages of a project."""
-
-    tools = "tools"
-    record = "record"
-    process = "process"
-    coverage = "coverage"
-    teach = "teach"
-    policy = "policy"
-    robot = "robot"
 
 
 def create_app(settings: Settings) -> FastAPI:
@@ -132,14 +122,22 @@ def studies_page() -> Response:
     return page_file("studies")
 
 
+@pages.get("/p/{project_id}")
+def first_page(project_id: str) -> Response:
+    """A project's address without a page leads to its tools."""
+    return RedirectResponse(f"/p/{quote(project_id)}/tools")
+
+
 @pages.get("/p/{project_id}/{page}")
-def project_page(project_id: str, page: PageName, request: Request) -> Response:
+def project_page(project_id: str, page: str, request: Request) -> Response:
     """One of a project's pages. For a project that doesn't exist the page itself says so; only the status differs."""
+    if page not in PAGES:
+        raise HTTPException(404)
     try:
         get_project(request.app.state.context, project_id)
     except NotFound:
-        return page_file(page.value, status=404)
-    return page_file(page.value)
+        return page_file(page, status=404)
+    return page_file(page)
 
 
 @pages.get("/favicon.ico")

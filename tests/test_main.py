@@ -34,7 +34,16 @@ def test_every_page_is_served_and_its_parts_exist(client: TestClient, api: Api) 
 
 def test_pages_of_unknown_projects_and_unknown_pages_are_404(client: TestClient) -> None:
     assert client.get("/p/nothing/tools").status_code == 404
-    assert client.get("/p/nothing/other").status_code in (404, 422)
+    assert client.get("/p/nothing/other").status_code == 404
+
+
+def test_a_mistyped_address_is_a_page_for_people_and_a_problem_for_programs(client: TestClient) -> None:
+    for address in ("/tols", "/p/nothing/other"):
+        page = client.get(address, headers={"Accept": "text/html,application/xhtml+xml"})
+        assert (page.status_code, page.headers["content-type"].split(";")[0]) == (404, "text/html")
+        assert client.get(address).json()["detail"] == f"There is nothing at {address}."
+    assert client.get("/api/v1/tols", headers={"Accept": "text/html"}).json()["error"] == "NotFound"
+    assert client.get("/p/nothing", follow_redirects=False).headers["location"] == "/p/nothing/tools"
 
 
 def test_the_reference_lists_every_operation_and_loads_nothing(client: TestClient) -> None:

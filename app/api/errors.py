@@ -11,12 +11,13 @@ from typing import Any
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import JSONResponse
+from fastapi.responses import FileResponse, JSONResponse, Response
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
 from app import errors
+from app.settings import ROOT
 
 logger = logging.getLogger("apprentice.api")
 
@@ -117,9 +118,11 @@ def install(app: FastAPI) -> None:
         return problem(request, 422, NAMES[422], describe_validation(faults))
 
     @app.exception_handler(HTTPException)
-    def http(request: Request, error: HTTPException) -> JSONResponse:
+    def http(request: Request, error: HTTPException) -> Response:
         if error.status_code == 405:
             return _method_not_allowed(app, request)
+        if error.status_code == 404 and _typed_by_a_person(request):
+            return FileResponse(ROOT / "static" / "missing.html", 404, media_type="text/html")
         detail = str(error.detail)
         if error.status_code == 404 and detail == "Not Found":
             detail = f"There is nothing at {request.url.path}."
@@ -131,6 +134,11 @@ def install(app: FastAPI) -> None:
         logger.error("request %s %s %s failed: %r", request_id(request), request.method, request.url.path, error)
         detail = f"The server made a mistake; it is logged under request {request_id(request)}."
         return problem(request, 500, NAMES[500], detail)
+
+
+def _typed_by_a_person(request: Request) -> bool:
+    """Whether a browser wants to show what is at this address; programs and the page's own scripts get a problem."""
+    return "text/html" in request.headers.get("accept", "") and not request.url.path.startswith(("/api/", "/static/"))
 
 
 def _method_not_allowed(app: FastAPI, request: Request) -> JSONResponse:
