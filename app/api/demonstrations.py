@@ -1,8 +1,9 @@
 """Demonstrations: complete orders by an expert."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Response
+from pydantic import Field
 
 from app.api.dependencies import Body, Ctx, Json, Name, Paging, RegionOrder, Row, Version, located, page, tagged
 from app.api.idempotency import ActionRoute, IdempotencyKey
@@ -20,9 +21,10 @@ class NewDemonstration(Body):
 
 
 class DemonstrationChanges(Body):
-    """What may change later: only the name."""
+    """What may change later; what is left out stays."""
 
-    name: Name
+    name: Name | None = None
+    author: Annotated[Name | None, Field(description="Whose order it is; null: the project's own expert's.")] = None
 
 
 class Demonstration(Row):
@@ -67,7 +69,7 @@ def list_tool_demonstrations(ctx: Ctx, tool_id: str, paging: Paging) -> Demonstr
 
 @router.post("/tools/{tool_id}/demonstrations", status_code=201, response_model=Demonstration)
 def create_demonstration(ctx: Ctx, tool_id: str, body: NewDemonstration, response: Response, _key: IdempotencyKey = None) -> Json:
-    """Store a complete order; it supersedes the tool's earlier demonstration."""
+    """Store a complete order; it supersedes the same author's earlier demonstration of the tool."""
     row = workflow.create_demonstration(ctx, tool_id, body.sequence, body.name, body.author)
     return located(response, "demonstrations", row)
 
@@ -80,8 +82,11 @@ def get_demonstration(ctx: Ctx, demonstration_id: str, response: Response) -> Js
 
 @router.patch("/demonstrations/{demonstration_id}", response_model=Demonstration)
 def update_demonstration(ctx: Ctx, demonstration_id: str, body: DemonstrationChanges, version: Version, response: Response) -> Json:
-    """Rename a demonstration."""
-    return tagged(response, workflow.update_demonstration(ctx, demonstration_id, {"name": body.name}, version))
+    """Rename a demonstration, or say whose it is."""
+    changes = body.model_dump(exclude_unset=True)
+    if changes.get("name") is None:
+        changes.pop("name", None)
+    return tagged(response, workflow.update_demonstration(ctx, demonstration_id, changes, version))
 
 
 @router.delete("/demonstrations/{demonstration_id}", status_code=204)

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Query, Response
 from pydantic import Field
 
 from app.api.demonstrations import Demonstration
@@ -26,9 +26,10 @@ class Order(Body):
 
 
 class DemonstrationName(Body):
-    """How the saved demonstration is called; left out: after the tool."""
+    """How the saved demonstration is called, after the tool if left out; and whose order it is."""
 
     name: Name | None = None
+    author: Annotated[Name | None, Field(description="It takes the place of this author's earlier order of the tool.")] = None
 
 
 class CoverageGain(Row):
@@ -61,9 +62,11 @@ class Draft(Row):
 
 
 @router.get("", response_model=Draft)
-def get_draft(ctx: Ctx, tool_id: str) -> Json:
+def get_draft(
+    ctx: Ctx, tool_id: str, author: Annotated[str | None, Query(max_length=120, description="For the coverage it would bring.")] = None
+) -> Json:
     """The draft; empty before the first click."""
-    return workflow.get_draft(ctx, tool_id)
+    return workflow.get_draft(ctx, tool_id, author)
 
 
 @router.put("", response_model=Draft)
@@ -104,6 +107,6 @@ def carry_over(ctx: Ctx, tool_id: str, _key: IdempotencyKey = None) -> Json:
 
 @router.post("/save", status_code=201, response_model=Demonstration)
 def save(ctx: Ctx, tool_id: str, response: Response, body: DemonstrationName | None = None, _key: IdempotencyKey = None) -> Json:
-    """Make a complete draft the tool's demonstration."""
-    name = body.name if body else None
-    return located(response, "demonstrations", workflow.save(ctx, tool_id, name=name))
+    """Make a complete draft a demonstration of the tool."""
+    about = body or DemonstrationName()
+    return located(response, "demonstrations", workflow.save(ctx, tool_id, name=about.name, author=about.author))

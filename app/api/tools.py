@@ -81,6 +81,13 @@ class EditState(Row):
     step: int
 
 
+class ToolAuthor(Row):
+    """An expert whose order of the tool counts."""
+
+    name: str
+    own: bool  # the project's own expert: no name, or the one a table or the sample came with
+
+
 class Tool(Row):
     """A part and where its import stands."""
 
@@ -98,7 +105,8 @@ class Tool(Row):
     split: Literal["train", "test"] | None
     region_count: int | None
     demonstrated: bool
-    demonstration_id: str | None
+    demonstration_id: str | None  # the newest, whoever's it is
+    demonstrated_by: list[ToolAuthor]
     feature_set: str | None
     segmentation_id: str | None
     edit: EditState

@@ -1,4 +1,4 @@
-"""Demonstrations: complete orders, the newest of a tool counts, deleting can be undone."""
+"""Demonstrations: complete orders, each expert's newest of a tool counts, deleting can be undone."""
 
 from typing import Any
 
@@ -9,6 +9,7 @@ from app.sequencing.problem import check_sequence
 from app.storage import emit
 from app.storage.identity import now
 from app.storage.tables import ACTIVE_RUN_STATES, Demonstration, Project, Run, RunDemonstration, Segmentation, ToolRow
+from app.workflow.authors import expert_key, tidy_author
 from app.workflow.carry_over import carried_over, standing_of
 from app.workflow.context import Context
 from app.workflow.lookup import check_version, found, present, ready_segmentation
@@ -43,7 +44,7 @@ def get_demonstration(ctx: Context, demonstration_id: str) -> Json:
 def create_demonstration(
     ctx: Context, tool_id: str, sequence: list[int], name: str | None = None, author: str | None = None, source: str = "rest"
 ) -> Json:
-    """Store a complete order; it supersedes the tool's earlier demonstration.
+    """Store a complete order; it supersedes the same expert's earlier demonstration of the tool.
 
     Raises:
         IncompleteSequence: Names the regions that are missing, repeated or unknown.
@@ -69,7 +70,7 @@ def add_demonstration(
     author: str | None = None,
     click_times: list[float] | None = None,
 ) -> Demonstration:
-    """The row of a new demonstration; the one that stood so far is superseded."""
+    """The row of a new demonstration; the same expert's that stood so far is superseded."""
     row = Demonstration(
         project_id=tool.project_id,
         tool_id=tool.id,
@@ -77,7 +78,7 @@ def add_demonstration(
         name=checked_name(name if name is not None else tool.name),
         sequence=sequence,
         click_times=click_times,
-        author=author,
+        author=tidy_author(author),
         source=source,
     )
     session.add(row)
@@ -88,13 +89,15 @@ def add_demonstration(
 
 
 def update_demonstration(ctx: Context, demonstration_id: str, changes: Json, version: int | None = None) -> Json:
-    """Rename a demonstration."""
+    """Rename a demonstration, or say whose it is; of two orders that then are one expert's, the newer one counts."""
 
     def change(session: Session) -> Json:
         row = present(session, Demonstration, demonstration_id)
         check_version(row, version)
         row.name = checked_name(changes.get("name", row.name))
+        row.author = tidy_author(changes.get("author", row.author))
         _count(session, row)
+        _supersede_older(session, row)
         return demonstration_json(ctx.values, session, row)
 
     return ctx.store.write(change)
@@ -175,15 +178,26 @@ def demonstration_json(values: Values, session: Session, row: Demonstration) -> 
 
 
 def _supersede_others(session: Session, row: Demonstration) -> None:
-    others = select(Demonstration).where(
+    for other in _standing_with(session, row):
+        if other.id != row.id:
+            other.superseded_by = row.id
+            _count(session, other)
+
+
+def _supersede_older(session: Session, row: Demonstration) -> None:
+    """Let only the newest of an expert's orders of a tool stand."""
+    if row.superseded_by is None:
+        _supersede_others(session, max(_standing_with(session, row), key=lambda d: d.id))
+
+
+def _standing_with(session: Session, row: Demonstration) -> list[Demonstration]:
+    """The orders of the same tool by the same expert that weren't superseded, deleted ones left out."""
+    wanted = select(Demonstration).where(
         Demonstration.tool_id == row.tool_id,
-        Demonstration.id != row.id,
         col(Demonstration.superseded_by).is_(None),
         col(Demonstration.deleted_at).is_(None),
     )
-    for other in session.exec(others).all():
-        other.superseded_by = row.id
-        _count(session, other)
+    return [other for other in session.exec(wanted).all() if expert_key(other.author) == expert_key(row.author)]
 
 
 def _count(session: Session, row: Demonstration) -> None:

@@ -16,6 +16,7 @@ from app.storage.tables import (
     Segmentation,
     ToolRow,
 )
+from app.workflow.authors import expert_key
 
 Row = TypeVar("Row", bound=SQLModel)
 Versioned = TypeVar("Versioned", Project, ToolRow, Demonstration)
@@ -85,7 +86,7 @@ def same_regions(session: Session, segmentation_id: str, cut: Segmentation) -> b
 
 
 def standing(session: Session, project_id: str) -> list[Demonstration]:
-    """The demonstrations that count: newest of each tool, on its current regions, nothing deleted; in order of the tools."""
+    """The demonstrations that count: each expert's newest of each tool, on its current regions, nothing deleted; in order of the tools."""
     now = aliased(Segmentation)
     wanted = (
         select(Demonstration)
@@ -100,8 +101,8 @@ def standing(session: Session, project_id: str) -> list[Demonstration]:
             col(now.current),
         )
     )
-    newest = {row.tool_id: row for row in session.exec(wanted.order_by(col(Demonstration.id)))}
-    return [newest[tool] for tool in sorted(newest)]
+    newest = {(row.tool_id, expert_key(row.author)): row for row in session.exec(wanted.order_by(col(Demonstration.id)))}
+    return [newest[key] for key in sorted(newest)]
 
 
 def active_run(session: Session, project_id: str) -> Run | None:

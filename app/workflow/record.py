@@ -9,6 +9,7 @@ from app.errors import IncompleteSequence
 from app.storage import emit
 from app.storage.identity import now
 from app.storage.tables import Draft, Project, Segmentation, ToolRow
+from app.workflow.authors import expert_key
 from app.workflow.carry_over import carry_over_draft, older_draft
 from app.workflow.context import Context
 from app.workflow.demonstrations import (
@@ -47,13 +48,13 @@ Json = dict[str, Any]
 KEPT_STEPS = 200  # of undo
 
 
-def get_draft(ctx: Context, tool_id: str) -> Json:
-    """The draft; empty before the first click."""
+def get_draft(ctx: Context, tool_id: str, author: str | None = None) -> Json:
+    """The draft; empty before the first click. What saving it brings is told for an order by `author`."""
 
     def query(session: Session) -> Json:
         row = present(session, ToolRow, tool_id)
         cut = ready_segmentation(session, row)
-        return draft_json(ctx, session, row, cut, _draft(session, cut))
+        return draft_json(ctx, session, row, cut, _draft(session, cut), author)
 
     return ctx.store.read(query)
 
@@ -137,8 +138,8 @@ def carry_over(ctx: Context, tool_id: str) -> Json:
     return get_draft(ctx, tool_id)
 
 
-def save(ctx: Context, tool_id: str, name: str | None = None) -> Json:
-    """Make a complete draft the tool's demonstration.
+def save(ctx: Context, tool_id: str, name: str | None = None, author: str | None = None) -> Json:
+    """Make a complete draft the demonstration of the tool by an expert; other experts' stay.
 
     Raises:
         IncompleteSequence: Names the regions without a number.
@@ -153,7 +154,8 @@ def save(ctx: Context, tool_id: str, name: str | None = None) -> Json:
             raise IncompleteSequence(
                 f"{', '.join(missing)} {'has' if len(missing) == 1 else 'have'} no number yet; an order holds every region once."
             )
-        shown = add_demonstration(session, row, cut, draft.sequence, "recorded", name=name, click_times=_relative(draft.click_times))
+        times = _relative(draft.click_times)
+        shown = add_demonstration(session, row, cut, draft.sequence, "recorded", name=name, author=author, click_times=times)
         if draft in session:
             session.delete(draft)
         emit(session, "draft.changed", row.project_id, tool_id=tool_id)
@@ -162,7 +164,7 @@ def save(ctx: Context, tool_id: str, name: str | None = None) -> Json:
     return ctx.store.write(change)
 
 
-def draft_json(ctx: Context, session: Session, row: ToolRow, cut: Segmentation, draft: Draft) -> Json:
+def draft_json(ctx: Context, session: Session, row: ToolRow, cut: Segmentation, draft: Draft, author: str | None = None) -> Json:
     """The draft as REST shows it."""
     complete = len(draft.sequence) == cut.region_count
     return {
@@ -173,15 +175,15 @@ def draft_json(ctx: Context, session: Session, row: ToolRow, cut: Segmentation, 
         "can_redo": bool(draft.future),
         "complete": complete,
         "older": older_draft(ctx.values, session, cut),
-        "coverage_gain": _gain(ctx, session, row, draft) if complete else None,
+        "coverage_gain": _gain(ctx, session, row, draft, author) if complete else None,
     }
 
 
-def _gain(ctx: Context, session: Session, row: ToolRow, draft: Draft) -> Json:
+def _gain(ctx: Context, session: Session, row: ToolRow, draft: Draft, author: str | None) -> Json:
     """What saving the draft does to rho."""
     project = present(session, Project, row.project_id)
     standing_report = report_of(ctx.values, session, project, ())[1]
-    report = report_of(ctx.values, session, project, ((row.id, tuple(draft.sequence)),))[1]
+    report = report_of(ctx.values, session, project, ((row.id, expert_key(author), tuple(draft.sequence)),))[1]
     before = standing_report.rho if standing_report else 0.0
     after = report.rho if report else 0.0
     covered = f"{report.captured if report else 0} of {report.possible if report else 0} situations covered"

@@ -4,11 +4,12 @@ from sqlmodel import Session
 
 from app.learning.coverage import CoverageReport, coverage
 from app.storage.tables import Project, ToolRow
+from app.workflow.authors import expert_key
 from app.workflow.feature_choice import project_features
 from app.workflow.lookup import current_segmentation, standing, tools_of
 from app.workflow.values import Values, interactions_from
 
-Pick = tuple[str, tuple[int, ...]]  # tool id, sequence
+Pick = tuple[str, str, tuple[int, ...]]  # tool id, key of the expert, sequence
 
 
 def rho(values: Values, session: Session, project: Project) -> float | None:
@@ -18,18 +19,19 @@ def rho(values: Values, session: Session, project: Project) -> float | None:
 
 
 def report_of(values: Values, session: Session, project: Project, extra: tuple[Pick, ...]) -> tuple[list[ToolRow], CoverageReport | None]:
-    """The report on the standing demonstrations, with `extra` ones in place of those of their tools."""
-    picks: dict[str, tuple[int, ...]] = {d.tool_id: tuple(d.sequence) for d in standing(session, project.id)}
-    picks.update(extra)
+    """The report on the standing demonstrations, with `extra` ones in place of the same expert's of the same tool."""
+    picks = {(d.tool_id, expert_key(d.author)): tuple(d.sequence) for d in standing(session, project.id)}
+    picks.update({(tool, expert): sequence for tool, expert, sequence in extra})
+    shown_tools = {tool for tool, _ in picks}
     cuts = {t.id: cut for t in tools_of(session, project.id) if (cut := current_segmentation(session, t.id))}
     known = [t for t in tools_of(session, project.id) if t.id in cuts]
-    first = next((t for t in known if t.id in picks), None)
+    first = next((t for t in known if t.id in shown_tools), None)
     if first is None:
         return [], None
     tools = [t for t in known if cuts[t.id].feature_set == cuts[first.id].feature_set]
     interactions = interactions_from(project.interactions)
     counted = project_features(session, project.id, cuts[first.id].feature_set)
-    shown = tuple((i, picks[t.id]) for i, t in enumerate(tools) if t.id in picks)
+    shown = tuple((i, picks[key]) for i, t in enumerate(tools) for key in sorted(picks) if key[0] == t.id)
     key = (tuple(cuts[t.id].id for t in tools), shown, interactions, counted.name)
 
     def make() -> CoverageReport:

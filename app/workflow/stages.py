@@ -33,7 +33,7 @@ class Progress:
 
         return Progress(
             tools=tools_of(session, project_id),
-            demonstrated=[d.tool_id for d in standing(session, project_id)],
+            demonstrated=list(dict.fromkeys(d.tool_id for d in standing(session, project_id))),
             rho=rho,
             questions=rows(Query, Query.state == "open"),
             runs=rows(Run),

@@ -9,6 +9,7 @@ from app.storage import Store, emit
 from app.storage.artifacts import keep
 from app.storage.conversions import MEDIA_TYPE
 from app.storage.tables import Demonstration, Segmentation, ToolRow
+from app.workflow.authors import expert_key, shown_name
 from app.workflow.lookup import current_segmentation, run_training_on
 
 Json = dict[str, Any]
@@ -17,7 +18,7 @@ Json = dict[str, Any]
 def tool_json(session: Session, row: ToolRow) -> Json:
     """The tool as REST shows it."""
     cut = current_segmentation(session, row.id)
-    shown = tool_demonstration(session, cut) if cut else None
+    orders = tool_demonstrations(session, cut) if cut else []
     return {
         "id": row.id,
         "project_id": row.project_id,
@@ -32,8 +33,9 @@ def tool_json(session: Session, row: ToolRow) -> Json:
         "file_name": row.file_name,
         "split": row.split,
         "region_count": cut.region_count if cut else None,
-        "demonstrated": shown is not None,
-        "demonstration_id": shown.id if shown else None,
+        "demonstrated": bool(orders),
+        "demonstration_id": orders[0].id if orders else None,
+        "demonstrated_by": [{"name": shown_name(d.author), "own": not expert_key(d.author)} for d in orders],
         "feature_set": cut.feature_set if cut else None,
         "segmentation_id": cut.id if cut else None,
         "edit": edit_json(session, row, cut),
@@ -76,8 +78,8 @@ def steps_before(session: Session, cut: Segmentation) -> int:
     return count
 
 
-def tool_demonstration(session: Session, cut: Segmentation) -> Demonstration | None:
-    """The demonstration that counts for a tool's current cut."""
+def tool_demonstrations(session: Session, cut: Segmentation) -> list[Demonstration]:
+    """The demonstrations that count for a tool's current cut, one per expert, the newest first."""
     wanted = (
         select(Demonstration)
         .join(Segmentation, col(Segmentation.id) == col(Demonstration.segmentation_id))
@@ -88,7 +90,10 @@ def tool_demonstration(session: Session, cut: Segmentation) -> Demonstration | N
             col(Demonstration.superseded_by).is_(None),
         )
     )
-    return session.exec(wanted.order_by(col(Demonstration.id).desc())).first()
+    newest: dict[str, Demonstration] = {}
+    for row in session.exec(wanted.order_by(col(Demonstration.id).desc())):
+        newest.setdefault(expert_key(row.author), row)
+    return list(newest.values())
 
 
 def touch_tool(session: Session, row: ToolRow) -> None:

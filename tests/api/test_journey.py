@@ -69,13 +69,19 @@ def test_recording(client: TestClient, api: Api, sample: dict[str, Any]) -> None
     order = regions[::-1]
     state = api.call("PUT", draft, 200, json={"sequence": order})
     assert (state["sequence"], state["complete"]) == (order, True)
-    first = api.post(f"{draft}/save", {"name": "First"})
+    first = api.post(f"{draft}/save", {"name": "First", "author": "Kim"})
     assert (first["name"], first["sequence"], first["source"]) == ("First", order, "recorded")
     assert api.get(f"/tools/{tool['id']}")["demonstration_id"] == first["id"]
 
     second = api.post(f"/tools/{tool['id']}/demonstrations", {"sequence": regions, "name": "Second", "author": "Kim"})
     assert (second["source"], second["author"]) == ("rest", "Kim")
     assert api.get(f"/demonstrations/{first['id']}")["superseded_by"] == second["id"]
+    other = api.post(f"/tools/{tool['id']}/demonstrations", {"sequence": order, "author": "Lee"})
+    assert [entry["name"] for entry in api.get(f"/tools/{tool['id']}")["demonstrated_by"]] == ["Lee", "Kim"]
+    given = api.call("PATCH", f"/demonstrations/{other['id']}", 200, json={"author": "Kim"}, headers={"If-Match": f'"{other["version"]}"'})
+    assert given["author"] == "Kim"
+    assert [entry["name"] for entry in api.get(f"/tools/{tool['id']}")["demonstrated_by"]] == ["Kim"]
+    second = api.get(f"/demonstrations/{second['id']}")
     address = f"/demonstrations/{second['id']}"
     renamed = api.call("PATCH", address, 200, json={"name": "Other"}, headers={"If-Match": f'"{second["version"]}"'})
     assert renamed["name"] == "Other"

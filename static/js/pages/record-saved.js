@@ -26,6 +26,10 @@ export class SavedList {
     return this.items.filter((item) => !item.superseded_by).length;
   }
 
+  get authors() {
+    return this.items.filter((item) => item.source !== "scripted" && item.author).map((item) => item.author);
+  }
+
   async load() {
     this.items = (await all(`/projects/${this.projectId}/demonstrations`)).filter((item) => !item.deleted);
     this.items.sort((a, b) => Boolean(a.superseded_by) - Boolean(b.superseded_by) || b.created_at.localeCompare(a.created_at));
@@ -40,17 +44,28 @@ export class SavedList {
   }
 
   row(item) {
-    const facts = [item.name === item.tool_name ? "" : item.tool_name, item.source === "recorded" && item.author ? `by ${item.author}` : (SOURCES[item.source] ?? item.source), ago(item.created_at), item.superseded_by ? "replaced by a newer one" : ""].filter(Boolean).join(", ");
+    const facts = [item.name === item.tool_name ? "" : item.tool_name, SOURCES[item.source] ?? item.source, ago(item.created_at), item.superseded_by ? "replaced by a newer one" : ""].filter(Boolean).join(", ");
     const name = renameable(item.name, "demonstration", async (wanted) => {
       await patch(`/demonstrations/${item.id}`, { name: wanted }, item.version);
       await this.load();
     });
     name.classList.add("demo-name");
+    const whose = this.whose(item);
     const old = item.on_current_cut === false && !item.superseded_by;
     const replay = item.on_current_cut === false ? this.button(item, "play", "Replay", null, "Recorded on an older cut of this tool; the 3D view shows the regions of today") : this.button(item, "play", "Replay", () => this.onReplay(item));
-    return h(`li${item.superseded_by ? ".old" : ""}`, { dataset: { demonstration: item.id } }, name, h("span.demo-facts", {}, facts),
+    return h(`li${item.superseded_by ? ".old" : ""}`, { dataset: { demonstration: item.id } }, name, h("span.demo-facts", {}, whose, facts),
       h("span.demo-actions", {}, replay, item.superseded_by ? null : this.button(item, "again", "Record again", () => this.onAgain(item)), this.button(item, "trash", "Delete", () => this.discard(item))),
       old ? this.older(item) : item.on_current_cut === false ? null : strip(item.sequence, this.regions.get(item.tool_id) ?? []));
+  }
+
+  // Shown once somebody has given a name: only then there is someone to mix up.
+  whose(item) {
+    if (!this.authors.some((author) => author !== "Expert")) return null;
+    const name = renameable(item.author ?? "no name", "author", async (wanted) => {
+      await patch(`/demonstrations/${item.id}`, { author: wanted }, item.version);
+      await this.load();
+    });
+    return ["by ", name, ", "];
   }
 
   button(item, mark, words, run, reason = "") {

@@ -11,6 +11,7 @@ import { boot, pageAddress, query, remember, showFault } from "../shell.js";
 import { complain, toast } from "../toasts.js";
 import { View3D } from "../view3d.js";
 import { plural } from "../words.js";
+import { Author, standingWords } from "./record-author.js";
 import { SavedList } from "./record-saved.js";
 import { letterKeys } from "./region-letters.js";
 import { reorderable } from "./reorder.js";
@@ -47,7 +48,8 @@ function layout() {
   const list = h("ol.seq-list");
   const left = h("div.left-list");
   const gain = h("div.hintbar");
-  return { undo, redo, back, play, forward, speed, clear, hint, stage, say, tabs, count, panel, aside, head, list, left, gain, body: h("div.split", {}, stage, aside) };
+  const author = new Author({ onChange: () => Promise.resolve(paint()).then(reload).catch(complain) });
+  return { undo, redo, back, play, forward, speed, clear, hint, stage, say, tabs, count, panel, aside, head, list, left, gain, author, body: h("div.split", {}, stage, aside) };
 }
 
 const region = (id) => state.regions[id] ?? { name: String(id), description: "" };
@@ -72,6 +74,7 @@ function take(draft) {
   paint();
 }
 
+const draftOf = (id) => `/tools/${encodeURIComponent(id)}/draft${parts.author.name ? `?author=${encodeURIComponent(parts.author.name)}` : ""}`;
 const address = (action = "") => `/tools/${encodeURIComponent(state.tool.id)}/draft${action}`;
 
 function pick(id) {
@@ -102,7 +105,7 @@ async function save() {
   if (!state.draft?.complete || state.busy) return;
   state.busy = true;
   try {
-    const demonstration = await post(address("/save"), {});
+    const demonstration = await post(address("/save"), parts.author.name ? { author: parts.author.name } : {});
     toast(`${demonstration.name} saved`);
     await Promise.all([loadTools(), reload(), state.saved.load()]);
   } catch (error) {
@@ -206,8 +209,7 @@ function paintHead() {
   const button = state.replay?.title
     ? h("button.btn", { type: "button", dataset: { key: "save" }, onclick: stopReplay }, "Back to recording")
     : h(`button.btn${draft.complete ? ".primary" : ""}`, { type: "button", dataset: { key: "save", tip: why ?? "Save (Ctrl S)" }, "aria-disabled": draft.complete ? "false" : "true", onclick: save }, "Save demonstration");
-  const again = tool.demonstrated ? "Already demonstrated. What you save now takes the place of the older order." : "Click the regions in your order. Nothing is final until you save.";
-  fill(parts.head, h("div.title", {}, h("h1", {}, `Show how you work ${tool.name}`), h("p", {}, again)),
+  fill(parts.head, h("div.title", {}, h("h1", {}, `Show how you work ${tool.name}`), h("p", {}, standingWords(parts.author.split(tool)))),
     h("div.next", {}, h("p", {}, h("span.kicker", {}, kicker), h("span", {}, words)), button));
 }
 
@@ -220,7 +222,7 @@ function paintTabs() {
   parts.count.textContent = state.tab === "order" ? `${state.draft.sequence.length} of ${state.regions.length}` : "";
   if (parts.panel.dataset.tab === state.tab) return;
   parts.panel.dataset.tab = state.tab;
-  if (state.tab === "order") fill(parts.panel, h("div.scroll", {}, parts.list), h("div.left", {}, h("h3", {}, "Not done yet"), parts.left), parts.gain);
+  if (state.tab === "order") fill(parts.panel, h("div.scroll", {}, parts.list), h("div.left", {}, h("h3", {}, "Not done yet"), parts.left), parts.author.node, parts.gain);
   else fill(parts.panel, h("div.scroll", {}, state.saved.node));
 }
 
@@ -280,7 +282,7 @@ function paintView() {
 
 async function reload() {
   const id = state.tool.id;
-  const draft = await get(address());
+  const draft = await get(draftOf(id));
   if (state.tool.id === id) take(draft);
 }
 
@@ -300,7 +302,7 @@ async function open(id) {
   state.tool = state.tools.find((tool) => tool.id === id) ?? (await get(`/tools/${encodeURIComponent(id)}`));
   remember("tool", state.tool.id);
   drawCrumb();
-  const [regions, draft] = await Promise.all([all(`/tools/${encodeURIComponent(id)}/regions`), get(`/tools/${encodeURIComponent(id)}/draft`)]);
+  const [regions, draft] = await Promise.all([all(`/tools/${encodeURIComponent(id)}/regions`), get(draftOf(id))]);
   state.regions = regions.sort((a, b) => a.id - b.id);
   take(draft);
 }
@@ -317,7 +319,10 @@ async function start() {
   if (!tool) return showEmpty();
   fill(shell.main, parts.head, parts.body);
   state.view = new View3D(parts.stage, { projectId: shell.projectId, name: "record" });
-  state.saved = new SavedList({ projectId: shell.projectId, onReplay: (demonstration) => showSaved(demonstration).catch(complain), onAgain: (demonstration) => recordAgain(demonstration).catch(complain), onChange: () => paint() });
+  state.saved = new SavedList({ projectId: shell.projectId, onReplay: (demonstration) => showSaved(demonstration).catch(complain), onAgain: (demonstration) => recordAgain(demonstration).catch(complain), onChange: () => {
+    parts.author.offer(state.saved.authors);
+    paint();
+  } });
   await Promise.all([open(tool.id).then(bindAll), state.saved.load()]); // whoever sees the regions may press their letters at once
   paint();
   return undefined;

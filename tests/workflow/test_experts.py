@@ -1,0 +1,71 @@
+"""Several experts: orders kept apart, runs that learn from some of them, comparison, consistency."""
+
+from typing import Any
+
+import pytest
+
+from app.workflow import coverage, demonstrations, record, tools
+from app.workflow.context import Context
+from tests.workflow.conftest import project_of
+
+Json = dict[str, Any]
+
+
+@pytest.fixture
+def tool(sample: Context) -> Json:
+    """A tool nobody has shown."""
+    return next(t for t in tools.list_tools(sample, project_of(sample)["id"]) if t["split"] == "train" and not t["demonstrated"])
+
+
+def standing(ctx: Context, tool: Json) -> dict[str | None, list[int]]:
+    rows = demonstrations.list_demonstrations(ctx, tool_id=tool["id"])
+    return {d["author"]: d["sequence"] for d in rows if d["superseded_by"] is None}
+
+
+def test_orders_of_two_experts_stand_side_by_side(sample: Context, tool: Json) -> None:
+    """Each replaces only the same expert's; spelling and spaces of a name don't matter."""
+    n = tool["region_count"]
+    up, down, odd = list(range(n)), list(range(n))[::-1], [*range(1, n), 0]
+    demonstrations.create_demonstration(sample, tool["id"], up, author="Anna")
+    demonstrations.create_demonstration(sample, tool["id"], down, author="Ben")
+    assert standing(sample, tool) == {"Anna": up, "Ben": down}
+    record.place(sample, tool["id"], odd)
+    record.save(sample, tool["id"], author="  anna ")
+    assert standing(sample, tool) == {"anna": odd, "Ben": down}
+    shown = tools.get_tool(sample, tool["id"])
+    assert shown["demonstrated_by"] == [{"name": "anna", "own": False}, {"name": "Ben", "own": False}]
+    report = coverage.get_coverage(sample, tool["project_id"])
+    assert report["demonstrations"] == 5 + 2
+    assert project_of(sample)["stages"][1]["meta"] == "6"  # tools, not orders
+
+
+def test_without_names_an_order_takes_the_place_of_the_samples(sample: Context) -> None:
+    """As ever: one expert, no name, nothing to keep apart."""
+    shown = next(t for t in tools.list_tools(sample, project_of(sample)["id"]) if t["demonstrated"])
+    before = demonstrations.get_demonstration(sample, shown["demonstration_id"])
+    fresh = demonstrations.create_demonstration(sample, shown["id"], before["sequence"][::-1])
+    assert standing(sample, shown) == {None: before["sequence"][::-1]}
+    assert demonstrations.get_demonstration(sample, before["id"])["superseded_by"] == fresh["id"]
+
+
+def test_an_order_saved_under_the_wrong_name_is_given_to_its_expert(sample: Context, tool: Json) -> None:
+    n = tool["region_count"]
+    old = demonstrations.create_demonstration(sample, tool["id"], list(range(n)), author="Anna")
+    new = demonstrations.create_demonstration(sample, tool["id"], list(range(n))[::-1], author="Ben")
+    moved = demonstrations.update_demonstration(sample, new["id"], {"author": "Anna"}, new["version"])
+    assert moved["author"] == "Anna"
+    assert standing(sample, tool) == {"Anna": list(range(n))[::-1]}
+    assert demonstrations.get_demonstration(sample, old["id"])["superseded_by"] == new["id"]
+
+
+def test_the_gain_of_a_draft_counts_the_other_experts_order(sample: Context, tool: Json) -> None:
+    """What is announced for Ben is what saving under his name brings; Anna's order stays in."""
+    n = tool["region_count"]
+    before = coverage.get_coverage(sample, tool["project_id"])["steps"]
+    demonstrations.create_demonstration(sample, tool["id"], list(range(n)), author="Anna")
+    record.place(sample, tool["id"], [*range(0, n, 2), *range(1, n, 2)])
+    promised = record.get_draft(sample, tool["id"], "Ben")["coverage_gain"]
+    record.save(sample, tool["id"], author="Ben")
+    after = coverage.get_coverage(sample, tool["project_id"])
+    assert promised["after"] == after["rho"]
+    assert after["steps"] == before + 2 * n
