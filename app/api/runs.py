@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, File, Query, Response, UploadFile
 from pydantic import Field
 
-from app.api.dependencies import Body, Ctx, Json, Paging, Row, Seed, located, page
+from app.api.dependencies import Body, Ctx, Json, Name, Paging, Row, Seed, located, page
 from app.api.idempotency import ActionRoute, IdempotencyKey
 from app.workflow import question_files
 from app.workflow import runs as workflow
@@ -25,6 +25,10 @@ class NewRun(Body):
     mode: Annotated[Mode, Field(description="How a performance run learns: with proof, or Algorithm 1 as printed.")] = "certified"
     params: Annotated[dict[ParameterName, ParameterValue], Field(default_factory=dict)]
     seed: Seed | None = None
+    authors: Annotated[
+        list[Name],
+        Field(default_factory=list, max_length=50, description="Experts whose orders it learns from, pooled; none: all of them."),
+    ]
 
 
 class Parameter(Row):
@@ -49,6 +53,7 @@ class Run(Row):
     id: str
     project_id: str
     kind: Kind
+    authors: list[str]  # where there are several experts
     mode: Mode | None
     state: str
     round: int
@@ -140,7 +145,7 @@ def run_defaults(ctx: Ctx, project_id: str, kind: Kind, mode: Mode = "certified"
 @router.post("/projects/{project_id}/runs", status_code=202, response_model=Run)
 def start_run(ctx: Ctx, project_id: str, body: NewRun, response: Response, _key: IdempotencyKey = None) -> Json:
     """Start a learner in the background."""
-    return located(response, "runs", workflow.start_run(ctx, project_id, body.kind, body.params, body.seed, body.mode))
+    return located(response, "runs", workflow.start_run(ctx, project_id, body.kind, body.params, body.seed, body.mode, body.authors))
 
 
 @router.get("/runs/{run_id}", response_model=Run)

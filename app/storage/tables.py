@@ -194,6 +194,7 @@ class Run(SQLModel, table=True):
     project_id: str = owned("project.id")
     kind: str
     mode: str = Field(default="paper", sa_column_kwargs={"server_default": "paper"})  # of a performance run: how it learns
+    authors: list[str] = list_column()  # names of the experts it learns from, where there are several
     interest: list[str] = list_column()  # segmentations of the tools without a demonstration it may ask about, fixed at the start
     state: str = "queued"
     round: int = 0  # of questions: 0 before the first

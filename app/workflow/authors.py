@@ -48,3 +48,19 @@ def by_expert(rows: Iterable[Demonstration]) -> dict[str, list[Demonstration]]:
 def called(rows: list[Demonstration]) -> str:
     """The name of the expert of some demonstrations, as the newest one that has a name spells it."""
     return shown_name(next((row.author for row in sorted(rows, key=lambda r: r.id, reverse=True) if row.author), None))
+
+
+def orders_by(rows: list[Demonstration], names: list[str]) -> tuple[list[str], list[Demonstration]]:
+    """The orders of the named experts, of all of them if none is named, and what they are called; no names where there is one expert.
+
+    Raises:
+        InvalidInput: Nobody of that name has recorded an order that counts.
+    """
+    experts = by_expert(rows)
+    wanted = {expert_key(name) for name in names} or set(experts)
+    unknown = [name for name in names if expert_key(name) not in experts]
+    if unknown:
+        known = ", ".join(called(orders) for orders in experts.values())
+        raise InvalidInput(f"There is no order by {unknown[0]} to learn from. Experts with orders are: {known or 'none'}.")
+    shown = [called(orders) for key, orders in experts.items() if key in wanted]
+    return shown if len(experts) > 1 else [], [row for row in rows if expert_key(row.author) in wanted]

@@ -42,7 +42,7 @@ CHOICES["pair"] = [
 SIDES = {
     "similarity": (("Yours", "{name}, recorded"), ("Other", "by what is learned so far at least as good")),
     "preference": (("Left", "as good as the other"), ("Right", "as good as the other")),
-    "pair": (("Left", "nobody has recorded this tool"), ("Right", "nobody has recorded this tool")),
+    "pair": (("Left", "{who} recorded this tool"), ("Right", "{who} recorded this tool")),
 }
 
 
@@ -143,6 +143,7 @@ def query_json(session: Session, row: Query) -> Json:
     given = current_answer(session, row.id)
     together = session.exec(select(Query.id).where(Query.run_id == row.run_id, Query.round == row.round, Query.state != "withdrawn")).all()
     (left, left_note), (right, right_note) = SIDES[row.kind]
+    about = {"name": shown.name if shown else "", "who": _nobody(found(session, Run, row.run_id, "run"))}
     return {
         "id": row.id,
         "run_id": row.run_id,
@@ -152,8 +153,8 @@ def query_json(session: Session, row: Query) -> Json:
         "tool_id": row.tool_id,
         "tool_name": tool.name,
         "title": TITLES[row.kind],
-        "left": {"label": left, "note": left_note.format(name=shown.name if shown else ""), "sequence": row.left},
-        "right": {"label": right, "note": right_note, "sequence": row.right},
+        "left": {"label": left, "note": left_note.format(**about), "sequence": row.left},
+        "right": {"label": right, "note": right_note.format(**about), "sequence": row.right},
         "difference": row.difference,
         "why": row.why,
         "differs": row.differs,
@@ -199,3 +200,8 @@ def _check_value(query: Query, value: str) -> None:
 
 def _label(kind: str, value: str) -> str:
     return next(choice["label"] for choice in CHOICES[kind] if choice["value"] == value)
+
+
+def _nobody(run: Run) -> str:
+    """Who has not recorded the tools that a run asks about."""
+    return f"{' or '.join(run.authors)} hasn't" if run.authors else "nobody has"

@@ -88,6 +88,7 @@ def run_json(session: Session, row: Run) -> Json:
         "id": row.id,
         "project_id": row.project_id,
         "kind": row.kind,
+        "authors": row.authors,
         "mode": row.mode if row.kind == "performance" else None,
         "state": row.state,
         "round": row.round,

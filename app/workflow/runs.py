@@ -19,6 +19,7 @@ from app.storage.tables import (
     Segmentation,
     ToolRow,
 )
+from app.workflow.authors import orders_by
 from app.workflow.context import Context
 from app.workflow.feature_choice import ANY_TOOL, project_features
 from app.workflow.lookup import check_tools, current_segmentation, found, present, refuse_while_training, standing, tools_of
@@ -66,11 +67,19 @@ def run_defaults(ctx: Context, project_id: str, kind: str, mode: str = MODES[0])
     return {"parameters": parameter_rows(learns, {})}
 
 
-def start_run(ctx: Context, project_id: str, kind: str, params: Json | None = None, seed: int | None = None, mode: str = MODES[0]) -> Json:
-    """Start a learner on the demonstrations that count now.
+def start_run(
+    ctx: Context,
+    project_id: str,
+    kind: str,
+    params: Json | None = None,
+    seed: int | None = None,
+    mode: str = MODES[0],
+    authors: list[str] | None = None,
+) -> Json:
+    """Start a learner on the demonstrations that count now, those of the named experts or of all.
 
     Raises:
-        InvalidInput: Nothing to learn from, or an effort run without a policy to build on.
+        InvalidInput: Nothing to learn from, nobody of that name, or an effort run without a policy to build on.
         RunActive: Another run of the project is not at its end.
     """
     parameters_for(_learner(kind, mode), params or {})
@@ -79,11 +88,12 @@ def start_run(ctx: Context, project_id: str, kind: str, params: Json | None = No
         project = present(session, Project, project_id)
         refuse_while_training(session, project)
         base = _latest_policy(session, project_id) if kind == "effort" else None
-        shown = _demonstrations(session, project_id, base)
+        names, shown = _demonstrations(session, project_id, base, authors or [])
         row = Run(
             project_id=project_id,
             kind=kind,
             mode=mode,
+            authors=names,
             interest=_interest(session, project_id, shown) if kind == "performance" and mode == "certified" else [],
             seed=DEFAULT_SEED if seed is None else seed,
             params=params or {},
@@ -228,12 +238,18 @@ def _latest_policy(session: Session, project_id: str) -> PolicyRow:
     return row
 
 
-def _demonstrations(session: Session, project_id: str, base: PolicyRow | None) -> list[Demonstration]:
-    """The standing demonstrations that share one feature set."""
-    shown = [(d, found(session, Segmentation, d.segmentation_id, "segmentation").feature_set) for d in standing(session, project_id)]
+def _demonstrations(session: Session, project_id: str, base: PolicyRow | None, authors: list[str]) -> tuple[list[str], list[Demonstration]]:
+    """The standing demonstrations of some experts that share one feature set, and the experts' names where there are several.
+
+    An effort run that names nobody learns from those its policy was learned from.
+    """
+    if base and not authors:
+        authors = found(session, Run, base.run_id, "run").authors
+    names, orders = orders_by(standing(session, project_id), authors)
+    shown = [(d, found(session, Segmentation, d.segmentation_id, "segmentation").feature_set) for d in orders]
     own = base_name(base.feature_set) if base else ANY_TOOL
     wanted = own if own != ANY_TOOL else next((features for _, features in shown), None)
     kept = [d for d, features in shown if features == wanted]
     if not kept:
         raise InvalidInput("There is no recorded order to learn from. Record one first.")
-    return kept
+    return names, kept

@@ -18,6 +18,7 @@ from app.learning.performance import LearningDemonstration
 from app.learning.performance_conflict import contradiction_words
 from app.storage import emit
 from app.storage.tables import Demonstration, JobRow, Metric, PolicyRow, Query, Run, RunCheckpoint, RunDemonstration, Segmentation, ToolRow
+from app.workflow.authors import shown_name
 from app.workflow.feature_choice import stored_features
 from app.workflow.lookup import current_segmentation, found, same_regions
 from app.workflow.run_rows import TRAINING_JOB, checkpoint_of, current_answer, go, learner, parameters_for, write_policy
@@ -189,18 +190,19 @@ def _named(session: Session, row: Run, report: Json) -> Json:
     shown = demonstrations_of(session, row.id)
     cuts = [found(session, Segmentation, key, "segmentation") for key in row.interest]
 
-    def name(tool_id: str) -> Json:
-        return {"tool_id": tool_id, "tool_name": found(session, ToolRow, tool_id, "tool").name}
+    def name(tool_id: str, shown: Demonstration | None = None) -> Json:
+        called = found(session, ToolRow, tool_id, "tool").name if shown is None else _order_name(session, row, shown)
+        return {"tool_id": tool_id, "tool_name": called}
 
     ties = report["class_sizes"] or [None] * len(shown)
     demonstrated = [
-        {**name(d.tool_id), "slack": slack, "ties": size}
+        {**name(d.tool_id, d), "slack": slack, "ties": size}
         for d, slack, size in zip(shown, report["slack"] or [0.0] * len(shown), ties, strict=True)
     ]
     tools = [{**name(cuts[t["tool"]].tool_id), **{k: v for k, v in t.items() if k != "tool"}} for t in report["tools"]]
     conflicts = [
         {
-            "tools": [{**name(shown[i].tool_id), "slack": x} for i, x in zip(c["members"], c["slack"], strict=True)],
+            "tools": [{**name(shown[i].tool_id, shown[i]), "slack": x} for i, x in zip(c["members"], c["slack"], strict=True)],
             "resolved": c["resolved"],
         }
         for c in report["conflicts"]
@@ -223,7 +225,7 @@ def _close(session: Session, row: Run, out: Outcome) -> None:
         row.error = {
             "error": "ContradictoryAnswers",
             "detail": _words(session, row, out),
-            "tools": [shown[i].tool_id for i in found_odd],
+            "tools": list(dict.fromkeys(shown[i].tool_id for i in found_odd)),
         }
     go(session, row, out.outcome, _words(session, row, out))
 
@@ -240,6 +242,12 @@ def _words(session: Session, row: Run, out: Outcome) -> str:
     """What a step says, with the names of the tools where it says which demonstrations contradict each other."""
     if out.contradiction is None or out.outcome not in ("questions", "infeasible"):
         return out.message
-    names = [found(session, ToolRow, shown.tool_id, "tool").name for shown in demonstrations_of(session, row.id)]
+    names = [_order_name(session, row, shown) for shown in demonstrations_of(session, row.id)]
     words = contradiction_words(out.contradiction, names)
     return words if out.outcome == "infeasible" else f"Is the other order just as good? {words}"
+
+
+def _order_name(session: Session, row: Run, shown: Demonstration) -> str:
+    """What an order is called: its tool, and whose it is where a run learns from several experts."""
+    name = found(session, ToolRow, shown.tool_id, "tool").name
+    return f"{name} by {shown_name(shown.author)}" if len(row.authors) > 1 else name

@@ -4,7 +4,8 @@ from typing import Any
 
 import pytest
 
-from app.workflow import coverage, demonstrations, record, tools
+from app.errors import InvalidInput
+from app.workflow import coverage, demonstrations, record, runs, tools
 from app.workflow.context import Context
 from tests.workflow.conftest import project_of
 
@@ -69,3 +70,35 @@ def test_the_gain_of_a_draft_counts_the_other_experts_order(sample: Context, too
     after = coverage.get_coverage(sample, tool["project_id"])
     assert promised["after"] == after["rho"]
     assert after["steps"] == before + 2 * n
+
+
+def test_a_run_learns_from_the_experts_it_names(sample: Context, tool: Json) -> None:
+    """One of them, or all pooled; contradictions of pooled orders say whose they are."""
+    project, n = tool["project_id"], tool["region_count"]
+    demonstrations.create_demonstration(sample, tool["id"], list(range(n)), author="Anna")
+    with pytest.raises(InvalidInput, match=r"no order by Ben.*Scripted expert, Anna"):
+        runs.start_run(sample, project, "performance", authors=["Ben"])
+    run = settled(sample, runs.start_run(sample, project, "performance", authors=["scripted expert"]))
+    assert run["authors"] == ["Scripted expert"]
+    assert tool["id"] not in run["tools"]
+    assert run["state"] in ("waiting_for_expert", "converged"), run["message"]
+    runs.cancel(sample, run["id"])
+    pooled = settled(sample, runs.start_run(sample, project, "performance"))
+    assert pooled["authors"] == ["Scripted expert", "Anna"]
+    assert len(pooled["tools"]) == 6
+    assert pooled["state"] == "infeasible"
+    assert pooled["message"].startswith(f"{tool['name']} by Anna")
+    assert any(d["tool_name"].endswith("by Scripted expert") for d in pooled["report"]["demonstrations"])
+
+
+def test_with_one_expert_a_run_names_nobody(sample: Context, tool: Json) -> None:
+    run = runs.start_run(sample, tool["project_id"], "performance")
+    assert run["authors"] == []
+    assert settled(sample, run)["report"]["demonstrations"][0]["tool_name"] in {
+        t["name"] for t in tools.list_tools(sample, tool["project_id"])
+    }
+
+
+def settled(ctx: Context, run: Json) -> Json:
+    assert ctx.jobs.wait_idle(60)
+    return runs.get_run(ctx, run["id"])
