@@ -144,7 +144,9 @@ def test_every_page_reads_well_in_both_themes_and_lists_its_keys(desk: Studio) -
     for name in PAGES:
         desk.open(name)
         page.locator(".head h1, .question h1, .empty h2").first.wait_for()
-        page.wait_for_load_state("networkidle")
+        expect(page.locator(".skeleton")).to_have_count(0)
+        if page.locator(".view3d").count():
+            page.locator(".view3d iframe.shown").first.wait_for()
         for theme in ("light", "dark"):
             if page.evaluate("document.documentElement.dataset.theme") != theme:
                 page.get_by_role("button", name="Light or dark").click()
