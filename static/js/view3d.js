@@ -124,6 +124,13 @@ export class View3D {
     return listen("session.editing", (state) => state.session_id === this.session?.id && !this.changes && handler(state));
   }
 
+  // Reads that state now, without waiting for the event.
+  async tellAgain() {
+    if (!this.session || this.changes || this.wanted) return;
+    const { scene } = await get(`/sessions/${encodeURIComponent(this.session.id)}`);
+    if (scene.mode === "edit" && !this.changes && !this.wanted) this.told?.(scene);
+  }
+
   // A plain drag draws a box around regions instead of turning the view.
   boxing(on) {
     this.drag.on = on;

@@ -28,6 +28,7 @@ def editing(studio: Studio, name: str) -> tuple[dict, np.ndarray]:
     row = studio.tool(name)
     studio.open("tools", tool=row["id"])
     studio.page.locator(".view3d iframe.shown").wait_for()
+    studio.page.locator("tr[data-region]").first.wait_for()
     pixels = studio.region_pixels(sample_tool(name))
     studio.wait_for_regions(pixels)
     return row, pixels
@@ -42,6 +43,12 @@ def wait_for_count(studio: Studio, tool_id: str, count: int) -> dict:
     tool = studio.api.until(f"/tools/{tool_id}", lambda row: row["region_count"] == count)
     expect(studio.page.locator("[data-key=tab-regions]")).to_have_text(f"{count} regions")
     return tool
+
+
+def wait_for_step(studio: Studio, tool_id: str, step: int) -> None:
+    """Until server and page, whose history is open, stand at that step."""
+    studio.api.until(f"/tools/{tool_id}", lambda row: row["edit"]["step"] == step)
+    expect(studio.page.locator(".history-list li").nth(step)).to_have_class("now")
 
 
 def between(pixels: np.ndarray, region: int, towards: int, share: float = 0.25) -> np.ndarray:
@@ -122,9 +129,12 @@ def test_edits_in_the_view_and_undo_after_a_reload(desk: Studio) -> None:
         wait_for_count(desk, row["id"], count)
     assert not desk.api.get(f"/tools/{row['id']}")["edit"]["can_undo"]
     page.locator(".history-list li").nth(2).get_by_role("button").click()  # any step can be gone to
-    wait_for_count(desk, row["id"], 12)
-    page.keyboard.press("Control+Shift+z")
+    page.keyboard.press("Control+Shift+z")  # pressed while that is under way: it waits its turn
     wait_for_count(desk, row["id"], 13)
+    for _ in range(3):
+        page.keyboard.press("Control+z")
+    desk.api.until(f"/tools/{row['id']}", lambda tool: not tool["edit"]["can_undo"])
+    wait_for_count(desk, row["id"], 12)
 
 
 def test_edits_by_table_and_keyboard(desk: Studio) -> None:
@@ -170,6 +180,7 @@ def test_edits_by_table_and_keyboard(desk: Studio) -> None:
     expect(page.get_by_role("button", name="Show 1 hidden region")).to_have_count(0)
 
     page.keyboard.press("F2")
+    expect(page.locator(".region-table input")).to_be_focused()
     page.keyboard.type("Keel")
     page.keyboard.press("Enter")
     desk.api.until(f"/tools/{row['id']}/regions", lambda regions: "Keel" in [region["name"] for region in regions["items"]])

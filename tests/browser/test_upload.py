@@ -75,6 +75,7 @@ def test_a_dropped_part_asks_and_a_dropped_template_is_a_tool(tools_page: Page, 
         tools_page.locator('[data-key="template-json"]').click()
     assert download.value.suggested_filename == "region-table.json"
     drop(tools_page, "first.json", Path(download.value.path()).read_bytes())
+    expect(tools_page.locator(".title")).to_contain_text("first.json")
     expect(tools_page.locator("tr[data-region]")).to_have_count(4)
     assert studio.tool("first")["demonstrated"]
 

@@ -23,6 +23,8 @@ export class Editor {
     this.hovered = null;
     this.busy = "";
     this.fault = "";
+    this.waiting = []; // what was pressed while an edit was under way
+    this.running = false;
   }
 
   attach(view) {
@@ -36,11 +38,34 @@ export class Editor {
   }
 
   get possible() {
-    return Boolean(this.tool?.edit?.editable) && !this.busy;
+    return Boolean(this.tool?.edit?.editable);
   }
 
   get whyNot() {
     return this.tool?.edit?.why_not || (this.tool?.edit ? "" : "The regions of this tool cannot be edited.");
+  }
+
+  // Keys and buttons act one after the other, in the order they were pressed: those pressed while an edit is under way wait for it.
+  // What waits for a refused edit was meant for regions that there are not, and is forgotten; so is what was meant for another tool.
+  inTurn(run) {
+    const { id } = this.tool;
+    this.waiting.push(() => (this.tool?.id === id ? run() : null));
+    if (!this.running) this.takeTurns();
+  }
+
+  async takeTurns() {
+    this.running = true;
+    while (this.waiting.length) if ((await this.waiting.shift()()) === false) this.waiting = [];
+    this.running = false;
+  }
+
+  // A region by its row or letter; numbers may change until it is its turn, names stay.
+  pick(id, toggled = false) {
+    const name = this.region(id)?.name;
+    this.inTurn(() => {
+      const now = this.regions.findIndex((region) => region.name === name);
+      if (now >= 0) (toggled ? this.toggle(now) : this.select([now]));
+    });
   }
 
   get missing() {
@@ -72,7 +97,7 @@ export class Editor {
     if ("piece" in state) this.piece = state.piece && { ...state.piece, name: this.region(state.piece.region)?.name ?? "A patch outside the working surface" };
     if (shown !== JSON.stringify([this.selection, this.points, this.level])) this.fault = "";
     this.onChange();
-    if (this.mode === "surface" && this.points.length > before) this.act();
+    if (this.mode === "surface" && this.points.length > before) this.inTurn(() => this.act());
     if (this.mode === "rename") this.rename();
   }
 
@@ -145,14 +170,15 @@ export class Editor {
   // Confirms the mode: asks the server for the edit.
   async act() {
     const mode = MODES[this.mode];
-    if (!mode.edit || this.busy) return;
+    if (!mode.edit) return null;
     if (this.missing) {
       this.fault = `${this.missing}.`;
       this.onChange();
-      return;
+      return false;
     }
     const done = await this.edit(mode.edit(this), mode.words(this) || mode.name);
     if (done && mode.once) this.enter("select");
+    return done;
   }
 
   async edit(edit, words) {
@@ -171,9 +197,8 @@ export class Editor {
     return this.ask("Going back", `/segmentations/${encodeURIComponent(segmentation)}/restore`);
   }
 
-  // One request at a time; a refusal stays in words beside the tools until something changes.
+  // Only in turn; a refusal stays in words beside the tools until something changes.
   async ask(words, path, body = {}) {
-    if (this.busy) return false;
     const { id } = this.tool;
     this.busy = words;
     this.fault = "";
@@ -185,6 +210,7 @@ export class Editor {
       this.piece = null;
       this.busy = "";
       await this.onTool(tool);
+      await this.view?.tellAgain(); // what is selected now; the event of it may come later
     } catch (error) {
       fault = error.message;
       if (error.status === OUTDATED) this.onOutdated();

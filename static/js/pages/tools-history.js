@@ -38,7 +38,7 @@ export class History {
   step(item) {
     const facts = [plural(item.region_count, "region"), item.demonstrations ? plural(item.demonstrations, "demonstration") : "", ago(item.created_at)].filter(Boolean).join(", ");
     const state = item.current ? ".now" : item.undone ? ".undone" : "";
-    return h(`li${state}`, {}, h("button", { type: "button", "aria-current": item.current ? "step" : null, "aria-disabled": item.current || !this.editor.possible ? "true" : null, dataset: { key: `step-${item.id}`, tip: item.current ? "" : "Go back to this step; nothing is lost" }, onclick: () => !item.current && this.editor.possible && this.editor.restore(item.id) },
+    return h(`li${state}`, {}, h("button", { type: "button", "aria-current": item.current ? "step" : null, "aria-disabled": item.current || !this.editor.possible ? "true" : null, dataset: { key: `step-${item.id}`, tip: item.current ? "" : "Go back to this step; nothing is lost" }, onclick: () => !item.current && this.editor.possible && this.editor.inTurn(() => this.editor.restore(item.id)) },
       h("i.stop", { "aria-hidden": "true" }), h("span.words", {}, item.words), h("small", {}, facts)));
   }
 

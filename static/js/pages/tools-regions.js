@@ -96,7 +96,7 @@ export class RegionTable {
     if (!region[state]) return null;
     return h("button.row-flag", { type: "button", "aria-label": `${words} ${region.name}`, dataset: { tip: `${state === "locked" ? "Locked" : "Hidden"}. ${words} it` }, onclick: (event) => {
       event.stopPropagation();
-      this.editor.edit({ kind: state === "locked" ? "lock" : "hide", regions: [region.id], on: false }, `${words} ${region.name}`);
+      this.editor.inTurn(() => this.editor.edit({ kind: state === "locked" ? "lock" : "hide", regions: [region.id], on: false }, `${words} ${region.name}`));
     } }, icon(mark));
   }
 
@@ -112,8 +112,7 @@ export class RegionTable {
   }
 
   click(id, event) {
-    if (event.shiftKey || event.ctrlKey || event.metaKey) this.editor.toggle(id);
-    else this.editor.select([id]);
+    this.editor.pick(id, event.shiftKey || event.ctrlKey || event.metaKey);
   }
 
   focus(id) {
@@ -131,8 +130,8 @@ export class RegionTable {
       const next = row[step];
       next?.focus();
       if (next && event.shiftKey && !this.editor.selection.includes(Number(next.dataset.region))) this.editor.toggle(Number(next.dataset.region));
-    } else if (event.key === " ") this.editor.toggle(id);
-    else if (event.key === "Enter" && this.editor.mode === "select") this.editor.select([id]);
+    } else if (event.key === " ") this.editor.pick(id, true);
+    else if (event.key === "Enter" && this.editor.mode === "select" && !this.editor.running) this.editor.pick(id);
     else return;
     event.preventDefault();
   }
@@ -155,7 +154,7 @@ export class RegionTable {
     const hidden = regions.filter((region) => region.hidden).map((region) => region.id);
     this.facts.classList.toggle("beside", hidden.length > 0);
     fill(this.facts, one ? this.factsOf(one) : h("p", {}, selection.length ? `${regionNames(this.editor, selection)}: ` : `${plural(regions.length, "region")}, `, h("b", {}, area), selection.length ? "" : " of working surface"),
-      hidden.length ? h("button.btn.quiet.small", { type: "button", dataset: { key: "show-all" }, onclick: () => this.editor.edit({ kind: "hide", regions: hidden, on: false }, "Show all") }, icon("eye"), `Show ${plural(hidden.length, "hidden region")}`) : null);
+      hidden.length ? h("button.btn.quiet.small", { type: "button", dataset: { key: "show-all" }, onclick: () => this.editor.inTurn(() => this.editor.edit({ kind: "hide", regions: hidden, on: false }, "Show all")) }, icon("eye"), `Show ${plural(hidden.length, "hidden region")}`) : null);
   }
 
   factsOf(region) {

@@ -30,7 +30,7 @@ export class Toolbar {
   button(key, mark, words, run) {
     const node = h("button", { type: "button", dataset: { key: `mode-${key}`, mode: key }, "aria-label": MODES[key]?.name ?? words, onclick: (event) => {
       if (event.detail) node.blur(); // after a click of the mouse Enter finishes the edit instead of pressing the button again
-      run();
+      this.editor.inTurn(run);
     } }, icon(mark), h("span", {}, words));
     this.buttons.set(key, node);
     return node;
@@ -48,16 +48,18 @@ export class Toolbar {
   bindKeys() {
     const { editor } = this;
     const when = () => Boolean(editor.tool?.edit) && editor.tool.state === "ready";
+    const able = (test) => () => when() && (editor.running || test()); // what is under way may make it possible
+    const inTurn = (run) => () => editor.inTurn(run);
     for (const mode of ORDER.filter(Boolean)) {
       const { letter, key, name } = MODES[mode];
-      bind({ key: letter ?? key, shift: letter ? true : null, shown: shownKey(mode), name, when, run: () => editor.enter(mode) });
+      bind({ key: letter ?? key, shift: letter ? true : null, shown: shownKey(mode), name, when, run: inTurn(() => editor.enter(mode)) });
     }
-    bind({ key: "Enter", name: "Finish the edit", when: () => when() && MODES[editor.mode].edit && !editor.busy, run: () => editor.act() });
-    bind({ key: "Backspace", name: "Take the last point back", when: () => when() && editor.points.length > 0, run: () => editor.backspace() });
-    bind({ key: "Escape", name: "Leave the mode, then select nothing", when: () => when() && editor.leavable, run: () => editor.leave() });
-    bind({ key: "z", ctrl: true, shift: false, name: "Undo the last edit", when, run: () => editor.undo() });
-    bind({ key: "z", ctrl: true, shift: true, shown: "Ctrl Shift Z", name: "Redo", when, run: () => editor.redo() });
-    bind({ key: "a", ctrl: true, name: "Select all regions", when, run: () => editor.select(editor.regions.filter((region) => !region.hidden).map((region) => region.id)) });
+    bind({ key: "Enter", name: "Finish the edit", when: able(() => Boolean(MODES[editor.mode].edit)), run: inTurn(() => editor.act()) });
+    bind({ key: "Backspace", name: "Take the last point back", when: able(() => editor.points.length > 0), run: inTurn(() => editor.backspace()) });
+    bind({ key: "Escape", name: "Leave the mode, then select nothing", when: able(() => editor.leavable), run: inTurn(() => editor.leave()) });
+    bind({ key: "z", ctrl: true, shift: false, name: "Undo the last edit", when, run: inTurn(() => editor.undo()) });
+    bind({ key: "z", ctrl: true, shift: true, shown: "Ctrl Shift Z", name: "Redo", when, run: inTurn(() => editor.redo()) });
+    bind({ key: "a", ctrl: true, name: "Select all regions", when, run: inTurn(() => editor.select(editor.regions.filter((region) => !region.hidden).map((region) => region.id))) });
   }
 
   draw() {
@@ -69,17 +71,17 @@ export class Toolbar {
       const off = !editor.possible && !looks;
       node.setAttribute("aria-disabled", String(off));
       node.setAttribute("aria-pressed", String(editor.mode === key));
-      node.dataset.tip = [`${MODES[key].name} (${shownKey(key)})`, off ? editor.whyNot || "Wait until the edit is done" : MODES[key].tip].filter(Boolean).join("\n");
+      node.dataset.tip = [`${MODES[key].name} (${shownKey(key)})`, off ? editor.whyNot : MODES[key].tip].filter(Boolean).join("\n");
     }
     this.drawStep(this.undo, edit?.can_undo, `Undo${edit?.undo ? `: ${edit.undo}` : ""}`, "Ctrl Z", "Nothing to undo");
     this.drawStep(this.redo, edit?.can_redo, `Redo${edit?.redo ? `: ${edit.redo}` : ""}`, "Ctrl Shift Z", "Nothing to redo");
-    const hint = editor.possible || editor.busy ? MODES[editor.mode].hint(editor) : editor.whyNot || MODES.select.hint();
+    const hint = editor.possible ? MODES[editor.mode].hint(editor) : editor.whyNot || MODES.select.hint();
     if (this.hint.textContent !== hint) this.hint.textContent = hint;
     this.drawFinish();
   }
 
   drawStep(node, possible, words, key, none) {
-    node.setAttribute("aria-disabled", String(!possible || Boolean(this.editor.busy)));
+    node.setAttribute("aria-disabled", String(!possible));
     node.dataset.tip = possible ? `${words} (${key})` : none;
   }
 
@@ -108,9 +110,9 @@ export class Toolbar {
     const { editor } = this;
     const mode = MODES[editor.mode];
     const { missing } = editor;
-    const cancel = h("button.btn.quiet.small", { type: "button", dataset: { key: "cancel" }, onclick: () => editor.enter("select") }, editor.mode === "surface" ? "Done" : "Cancel", h("kbd", {}, "Esc"));
+    const cancel = h("button.btn.quiet.small", { type: "button", dataset: { key: "cancel" }, onclick: () => editor.inTurn(() => editor.enter("select")) }, editor.mode === "surface" ? "Done" : "Cancel", h("kbd", {}, "Esc"));
     const act = mode.edit && editor.mode !== "surface"
-      ? h(`button.btn.small${missing ? "" : ".primary"}`, { type: "button", "aria-disabled": missing ? "true" : null, dataset: { key: "act", tip: missing }, onclick: () => editor.act() }, missing ? mode.name : mode.words(editor), missing ? null : h("kbd", {}, "Enter"))
+      ? h(`button.btn.small${missing ? "" : ".primary"}`, { type: "button", "aria-disabled": missing ? "true" : null, dataset: { key: "act", tip: missing }, onclick: () => editor.inTurn(() => editor.act()) }, missing ? mode.name : mode.words(editor), missing ? null : h("kbd", {}, "Enter"))
       : null;
     return [this.options(), act, cancel];
   }
@@ -130,7 +132,7 @@ export class Toolbar {
       h("input.field", { type: "number", min: "1", max: String(MOST_ROWS), value: String(editor[key]), "aria-label": `Number of ${words}`, dataset: { key }, onchange: (event) => to(Number(event.currentTarget.value)), onkeydown: (event) => {
         if (event.key !== "Enter") return;
         to(Number(event.currentTarget.value));
-        editor.act();
+        editor.inTurn(() => editor.act());
       } }),
       h("button", { type: "button", "aria-label": `More ${words}`, dataset: { key: `${key}-more` }, onclick: () => to(editor[key] + 1) }, icon("plus")), h("span", {}, words));
   }

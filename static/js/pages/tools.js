@@ -236,7 +236,7 @@ async function start() {
   matchMedia(WIDE).addEventListener("change", arrange);
   await load(query("tool") ?? shell.project.next_step.tool_id);
   uploads.acceptDrops(shell.main);
-  letterKeys({ regions: () => editor.regions, pick: (region) => editor.select([region]), name: "Select a region" });
+  letterKeys({ regions: () => editor.regions, pick: (region) => editor.pick(region), name: "Select a region" });
   bind({ key: "u", ctrl: false, alt: true, shown: "Alt U", name: "Upload a tool", run: () => uploads.cad.click() });
   listenToAll();
 }
