@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Path, Response
 from pydantic import Field
 
 from app.api.dependencies import Body, Ctx, Json, Row, tagged
@@ -43,7 +43,9 @@ class Cell(Row):
     count: int
     p_value: float | None
     tools: list[CellTool]
-    request: str | None
+    text: str
+    request: str  # what to do about it, empty when captured or on no tool
+    need: str  # what a new tool needs to have it
 
 
 class InteractionTable(Row):
@@ -60,7 +62,7 @@ class InteractionTable(Row):
 
 
 class CoverageRequest(Row):
-    """A demonstration that would help."""
+    """What a demonstration of a tool would add."""
 
     text: str
     tool_id: str | None
@@ -68,15 +70,34 @@ class CoverageRequest(Row):
     regions: list[int]
     gain: float  # rise of rho by the best of a few orders
     expected: float  # change of rho, mean over these orders
+    useful: bool
 
 
 class Threshold(Row):
-    """Where a feature's middle level begins and ends."""
+    """Where a feature's middle level begins and ends, and how its values are spread over the project's tools."""
 
     feature: str
+    label: str
     low: float
     high: float
     rule: Literal["quantile", "range", "expert"]
+    suspected: bool  # a part of an interaction
+    least: float
+    most: float
+    counts: list[int]  # in equal slices from the least to the most
+
+
+class LevelChoice(Body):
+    """How the levels of a feature are found: thirds of the values, thirds of their range, or thresholds of one's own."""
+
+    rule: Literal["quantile", "range", "expert"]
+    low: Annotated[float, Field(allow_inf_nan=False)] | None = None
+    high: Annotated[float, Field(allow_inf_nan=False)] | None = None
+
+    @property
+    def thresholds(self) -> tuple[float, float] | None:
+        """Both, or None."""
+        return None if self.low is None or self.high is None else (self.low, self.high)
 
 
 class Coverage(Row):
@@ -105,3 +126,15 @@ def get_coverage(ctx: Ctx, project_id: str) -> Json:
 def set_interactions(ctx: Ctx, project_id: str, body: InteractionChoices, response: Response) -> Json:
     """Say which feature interactions the expert suspects."""
     return tagged(response, workflow.set_interactions(ctx, project_id, [choice.model_dump() for choice in body.interactions]))
+
+
+@router.put("/levels/{feature}", response_model=Coverage)
+def set_levels(ctx: Ctx, project_id: str, feature: Annotated[str, Path(max_length=60)], body: LevelChoice) -> Json:
+    """Say where small values of a feature end and large ones begin."""
+    return workflow.set_levels(ctx, project_id, feature, body.rule, body.thresholds)
+
+
+@router.delete("/levels/{feature}", response_model=Coverage)
+def reset_levels(ctx: Ctx, project_id: str, feature: Annotated[str, Path(max_length=60)]) -> Json:
+    """Back to the project's usual rule."""
+    return workflow.set_levels(ctx, project_id, feature, None)

@@ -12,9 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.geometry.tool import region_letters
-from app.learning.levels import LevelRules, Levels, Transitions, factor_groups, measure_levels, sample_transitions, sequence_values
+from app.learning.coverage_words import LEVEL_WORDS, advice, alike_words, listed, phrase, shape_needed, situation
+from app.learning.levels import (
+    LevelRules,
+    Levels,
+    Spread,
+    Transitions,
+    factor_groups,
+    measure_levels,
+    sample_transitions,
+    sequence_values,
+    spreads_of,
+)
 from app.learning.uniformity import uniform_p_value
-from app.sequencing.features import FeatureSet, Interaction, factor_label
+from app.sequencing.features import Interaction
 from app.sequencing.problem import SequencingProblem
 
 CellState = Literal["captured", "uneven", "missing", "impossible"]
@@ -23,8 +34,6 @@ Grid = NDArray[np.int64]
 SIGNIFICANCE = 0.05
 ORDERS_TRIED = 12  # per tool, for the gain of a request
 SHOWN = 3  # regions named per tool and cell
-LEVEL_WORDS = ("small", "middle", "large")
-PHRASES = {"height": "step in height", "curvature": "change of curvature", "orientation": "turn towards neighbours"}
 RULE = (
     "A situation counts as covered when a demonstration contains it and every other feature is evenly spread over those steps "
     "(chi-squared at 0.05, exact for small counts, corrected for the number of features)."
@@ -41,6 +50,7 @@ class Cell:
     tools: tuple[tuple[int, tuple[int, ...]], ...]  # tools that have it, with the regions where it is most common
     text: str  # "a large step in height with a small change of curvature"
     request: str  # what to do about it, empty when captured or impossible
+    need: str  # what a new tool needs to have it, empty when captured
 
 
 @dataclass(frozen=True)
@@ -57,13 +67,14 @@ class InteractionTable:
 
 @dataclass(frozen=True)
 class Request:
-    """A demonstration worth recording."""
+    """What a demonstration of a tool adds."""
 
     text: str
     tool_index: int
     regions: tuple[int, ...]
     gain: float  # in rho, of the best of a few orders of the tool; 0 when each new situation costs another its even spread
     expected: float  # change of rho, mean over these orders
+    useful: bool  # it can raise rho, or has a situation nobody has shown
 
 
 @dataclass(frozen=True)
@@ -76,9 +87,10 @@ class CoverageReport:
     steps: int
     tables: tuple[InteractionTable, ...]
     thresholds: Levels
-    requests: tuple[Request, ...]  # tools without a demonstration first, then by expected change of rho
+    requests: tuple[Request, ...]  # one per tool: useful ones first, of these tools without a demonstration, then by expected change of rho
     left_out: tuple[int, ...]  # tools with another feature set, which can't be compared
     shown: int = 0  # cells that some demonstration holds, however unevenly
+    spreads: tuple[Spread, ...] = ()  # per factor of the thresholds
     rule: str = RULE
 
     @property
@@ -102,7 +114,7 @@ def coverage(
         rules: How each factor's levels are found; terciles if None.
 
     Returns:
-        The report; every tool is a candidate for a request, another order of a demonstrated one too.
+        The report, with one request per tool, demonstrated ones too (another order may add something).
 
     Raises:
         UnknownFeature: An interaction names a factor the tools don't have.
@@ -129,7 +141,7 @@ def coverage(
     waiting = [i for i in alike if i not in {i for i, _ in demonstrations}]
     tables = tuple(study.table(k, states[k], waiting) for k in range(len(interactions)))
     asked = study.requests(steps, tables, captured, possible)
-    requests = sorted(asked, key=lambda r: (r.tool_index not in waiting, -r.expected, -r.gain, r.tool_index))
+    requests = sorted(asked, key=lambda r: (not r.useful, r.tool_index not in waiting, -r.expected, -r.gain, r.tool_index))
     left_out = tuple(i for i in range(len(problems)) if i not in alike)
     return CoverageReport(
         rho=captured / possible if possible else 0.0,
@@ -141,6 +153,7 @@ def coverage(
         requests=tuple(requests),
         left_out=left_out,
         shown=sum(j.count > 0 for table in states for j in table),
+        spreads=study.spreads,
     )
 
 
@@ -151,6 +164,7 @@ class _Judged:
     state: CellState
     count: int
     p_value: float | None
+    alike: tuple[int, int] | None = None  # of an uneven cell: the least even factor and its most common level
 
 
 @dataclass(frozen=True)
@@ -166,22 +180,27 @@ class _Study:
     spread: tuple[NDArray[np.bool_], ...]  # per interaction (9, factors, 3): which levels occur in a cell on any tool
     tested: tuple[int, ...]  # factors whose terciles differ, so that an even spread means something
     regions: dict[int, int]  # tool index -> number of regions
+    spreads: tuple[Spread, ...]  # per factor
+    labels: tuple[str, ...]  # of the factors
 
     @staticmethod
     def of(problems: list[SequencingProblem], alike: list[int], interactions: tuple[Interaction, ...], rules: LevelRules) -> "_Study":
         features = problems[alike[0]].features
-        phrases = tuple((_phrase(i.first, features), _phrase(i.second, features)) for i in interactions)
+        phrases = tuple((phrase(i.first, features), phrase(i.second, features)) for i in interactions)
         groups = factor_groups(features)
         keys = tuple(groups)
         home = {key: next(g for g in keys if set(features.factors[key]) <= set(groups[g])) for key in features.factors}
         axes = tuple((keys.index(home[i.first]), keys.index(home[i.second])) for i in interactions)
         sampled = {i: sample_transitions(problems[i]) for i in alike}
-        levels = measure_levels(keys, np.concatenate([t.values for t in sampled.values()]), rules)
+        values = np.concatenate([t.values for t in sampled.values()])
+        levels = measure_levels(keys, values, rules)
         grids = {i: levels.of(t.values) for i, t in sampled.items()}
         everything = np.concatenate(list(grids.values()))
         spread = tuple(_counts(everything, pair) > 0 for pair in axes)
         tested = tuple(f for f in range(len(keys)) if len(np.unique(everything[:, f])) == 3)
-        return _Study(interactions, axes, phrases, levels, sampled, grids, spread, tested, {i: problems[i].n for i in alike})
+        labels = tuple(phrase(key, features) for key in keys)
+        sizes = {i: problems[i].n for i in alike}
+        return _Study(interactions, axes, phrases, levels, sampled, grids, spread, tested, sizes, spreads_of(values), labels)
 
     def states(self, steps: Grid) -> list[list[_Judged]]:
         """Per interaction, its nine cells judged from demonstrated steps (S, factors)."""
@@ -197,9 +216,12 @@ class _Study:
             return _Judged("missing" if occurs[0].any() else "impossible", 0, None)
         others = [f for f in self.tested if f not in pair]
         possible = occurs | (counts > 0)  # the sample may have missed what a demonstration shows
-        tests = [uniform_p_value(tuple(int(c) for c in counts[f][possible[f]])) for f in others if possible[f].sum() > 1]
-        p = min(1.0, min(tests, default=1.0) * max(len(tests), 1))
-        return _Judged("captured" if p >= SIGNIFICANCE else "uneven", count, p)
+        tests = {f: uniform_p_value(tuple(int(c) for c in counts[f][possible[f]])) for f in others if possible[f].sum() > 1}
+        p = min(1.0, min(tests.values(), default=1.0) * max(len(tests), 1))
+        if p >= SIGNIFICANCE:
+            return _Judged("captured", count, p)
+        worst = min(tests, key=lambda f: tests[f])
+        return _Judged("uneven", count, p, (worst, int(counts[worst].argmax())))
 
     def places(self, k: int, cell: int) -> tuple[tuple[int, tuple[int, ...]], ...]:
         """Tools that have the cell, and where on them it is most common."""
@@ -215,49 +237,37 @@ class _Study:
     def table(self, k: int, judged: list[_Judged], waiting: list[int]) -> InteractionTable:
         cells = []
         for cell, j in enumerate(judged):
-            text = self.words(k, cell)
+            text = situation(*self.phrases[k], cell)
             tools = self.places(k, cell)
-            cells.append(Cell(j.state, j.count, j.p_value, tools, text, _advice(j.state, text, tools, waiting)))
+            alike = "" if j.alike is None else alike_words(self.labels[j.alike[0]], j.alike[1])
+            request = advice(j.state, text, tools, waiting, alike)
+            pair = self.interactions[k]
+            need = "" if j.state == "captured" else shape_needed((pair.first, pair.second), self.phrases[k], cell)
+            cells.append(Cell(j.state, j.count, j.p_value, tools, text, request, need))
         rows = tuple(tuple(cells[r : r + 3]) for r in (0, 3, 6))
         return InteractionTable(self.interactions[k], *self.phrases[k], LEVEL_WORDS, LEVEL_WORDS, rows)
 
-    def words(self, k: int, cell: int) -> str:
-        row, column = divmod(cell, 3)
-        return f"a {LEVEL_WORDS[row]} {self.phrases[k][0]} with a {LEVEL_WORDS[column]} {self.phrases[k][1]}"
-
     def requests(self, steps: Grid, tables: tuple[InteractionTable, ...], captured: int, possible: int) -> list[Request]:
-        """One request per tool that can raise rho or has a situation nobody has shown."""
+        """One per tool."""
         now, found = captured / possible if possible else 0.0, []
         for i in self.grids:
             changes = [self._rho(np.concatenate([steps, self.grids[i][order]])) - now for order in self.sampled[i].orders[:ORDERS_TRIED]]
             weak = [(c, dict(c.tools)[i]) for t in tables for row in t.cells for c in row if c.request and i in dict(c.tools)]
             gain = max(0.0, *changes)
-            if weak and (gain > 0 or any(c.state == "missing" for c, _ in weak)):
+            useful = bool(weak) and (gain > 0 or any(c.state == "missing" for c, _ in weak))
+            regions: tuple[int, ...] = ()
+            text = "shows nothing that is missing or uneven"
+            if useful:
                 weak.sort(key=lambda pair: pair[0].state != "missing")
                 regions = tuple(sorted(weak[0][1]))
                 letters = region_letters(self.regions[i])
-                text = f"{weak[0][0].text}, most of all at {_listed([letters[a] for a in regions])}"
-                found.append(Request(text[0].upper() + text[1:], i, regions, float(gain), float(np.mean(changes))))
+                text = f"{weak[0][0].text}, most of all at {listed([letters[a] for a in regions])}"
+            found.append(Request(text[0].upper() + text[1:], i, regions, float(gain), float(np.mean(changes)), useful))
         return found
 
     def _rho(self, steps: Grid) -> float:
         now, of = _tally(self.states(steps))
-        return now / of
-
-
-def _advice(state: CellState, text: str, tools: tuple[tuple[int, tuple[int, ...]], ...], waiting: list[int]) -> str:
-    if state in ("captured", "impossible"):
-        return ""
-    fresh = sum(i in waiting for i, _ in tools)
-    if not fresh:
-        return f"Only tools that already have a demonstration show {text}: record another order there, or add a tool."
-    need = "No demonstration shows" if state == "missing" else "The steps shown are too much alike for"
-    return f"{need} {text}; {fresh} tool{'' if fresh == 1 else 's'} without a demonstration {'has' if fresh == 1 else 'have'} it."
-
-
-def _phrase(key: str, features: FeatureSet) -> str:
-    label = factor_label(key, features)  # refuses an unknown factor
-    return PHRASES.get(key, label)
+        return now / of if of else 0.0
 
 
 def _cell(grid: Grid, pair: tuple[int, int]) -> Grid:
@@ -274,7 +284,3 @@ def _counts(grid: Grid, pair: tuple[int, int]) -> Grid:
 def _tally(states: list[list[_Judged]]) -> tuple[int, int]:
     flat = [j.state for table in states for j in table]
     return sum(s == "captured" for s in flat), sum(s != "impossible" for s in flat)
-
-
-def _listed(names: list[str]) -> str:
-    return ", ".join(names[:-1]) + " and " + names[-1] if len(names) > 1 else "".join(names)

@@ -15,6 +15,8 @@ ORDERS = 24  # random orders per tool whose steps stand for all transitions
 SEED = 20230523  # fixed: the same tools always give the same levels
 Rule = Literal["quantile", "range", "expert"]
 
+BINS = 24  # slices of the range in which values are counted for people to look at
+
 EVEN = 1e-9  # values this close (as a share of the range) are on the same side of a threshold
 
 
@@ -40,6 +42,15 @@ class LevelRules:
         if any(key == name for name, *_ in self.expert):
             return "expert"
         return dict(self.chosen).get(key, self.default)
+
+
+@dataclass(frozen=True)
+class Spread:
+    """How often which values of a factor occur on the tools at hand."""
+
+    least: float
+    most: float
+    counts: tuple[int, ...]  # in BINS equal slices from the least to the most
 
 
 @dataclass(frozen=True)
@@ -87,6 +98,16 @@ def sequence_values(problem: SequencingProblem, sequence: tuple[int, ...]) -> Ar
     """Factor values of each step, (N, factors)."""
     order = np.array([sequence])
     return factor_values(problem, problem.values(_prefixes(order)))[np.arange(problem.n), order[0]]
+
+
+def spreads_of(values: Array) -> tuple[Spread, ...]:
+    """Of values (T, factors), one per factor."""
+    found = []
+    for column in values.T:
+        least, most = float(column.min()), float(column.max())
+        counts = np.histogram(column, BINS, (least, most if most > least else least + 1.0))[0]
+        found.append(Spread(least, most, tuple(int(c) for c in counts)))
+    return tuple(found)
 
 
 def measure_levels(keys: tuple[str, ...], values: Array, rules: LevelRules | None = None) -> Levels:

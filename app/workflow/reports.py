@@ -3,6 +3,8 @@
 from sqlmodel import Session
 
 from app.learning.coverage import CoverageReport, coverage
+from app.learning.levels import LevelRules, factor_groups
+from app.sequencing.features import FeatureSet
 from app.storage.tables import Project, ToolRow
 from app.workflow.authors import expert_key
 from app.workflow.feature_choice import project_features
@@ -32,10 +34,19 @@ def report_of(values: Values, session: Session, project: Project, extra: tuple[P
     interactions = interactions_from(project.interactions)
     counted = project_features(session, project.id, cuts[first.id].feature_set)
     shown = tuple((i, picks[key]) for i, t in enumerate(tools) for key in sorted(picks) if key[0] == t.id)
-    key = (tuple(cuts[t.id].id for t in tools), shown, interactions, counted.name)
+    rules = level_rules(project, counted)
+    key = (tuple(cuts[t.id].id for t in tools), shown, interactions, counted.name, rules)
 
     def make() -> CoverageReport:
         problems = [values.problem(session, cuts[t.id], interactions, counted) for t in tools]
-        return coverage(problems, list(shown), interactions)
+        return coverage(problems, list(shown), interactions, rules)
 
     return tools, values.reports.get(key, make)
+
+
+def level_rules(project: Project, features: FeatureSet) -> LevelRules:
+    """How the project's levels are found; what was chosen for a feature that doesn't count now waits until it does."""
+    known, levels = factor_groups(features).keys(), project.levels
+    chosen = tuple((key, rule) for key, rule in sorted(levels.get("chosen", {}).items()) if key in known)
+    expert = tuple((key, float(low), float(high)) for key, (low, high) in sorted(levels.get("expert", {}).items()) if key in known)
+    return LevelRules(levels.get("default", "quantile"), chosen, expert)

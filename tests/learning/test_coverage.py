@@ -217,3 +217,23 @@ def test_p_value_of_a_cell_by_hand():
             assert cell.state == ("captured" if cell.p_value >= 0.05 else "uneven")
             checked += 1
     assert checked
+
+
+def test_uneven_cells_say_what_is_alike_and_what_a_new_tool_needs():
+    """Forty times the same order: every uneven cell names a factor and level; no covered cell asks for anything."""
+    tool = problem_for(grid_graph(3, 3, 2))
+    report = coverage([tool], [(0, tuple(range(9)))] * 40, DEFAULT_INTERACTIONS)
+    cells = [c for t in report.tables for row in t.cells for c in row]
+    uneven = [c for c in cells if c.state == "uneven"]
+    assert uneven
+    assert all(" is mostly " in c.request and c.need.startswith("A new tool needs a region") for c in uneven)
+    assert all(not c.need and not c.request for c in cells if c.state == "captured")
+
+
+def test_every_tool_is_ranked_and_spreads_count_all_values(tools):
+    report = coverage(tools, recorded(tools, 3), DEFAULT_INTERACTIONS)
+    assert sorted(r.tool_index for r in report.requests) == list(range(5))
+    assert [r.useful for r in report.requests] == sorted((r.useful for r in report.requests), reverse=True)
+    values = np.concatenate([sample_transitions(p).values for p in tools])
+    assert [sum(s.counts) for s in report.spreads] == [len(values)] * values.shape[1]
+    assert [s.least for s in report.spreads] == pytest.approx(values.min(axis=0))

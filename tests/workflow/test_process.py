@@ -114,3 +114,29 @@ def test_a_run_and_its_policy_keep_the_features_they_started_with(ctx: Context, 
     plan = policies.make_plan(ctx, policy["id"], fresh["id"])
     assert sorted(plan["sequence"]) == list(range(fresh["region_count"]))
     assert len(plan["features"]) == len(policy["weights"])
+
+
+def test_thresholds_of_ones_own_change_the_report_and_outlive_a_switched_off_feature(ctx: Context, project: dict[str, Any]) -> None:
+    """Everything is 'small' under a threshold above all values; stored with the report; waits while the feature is off; reset."""
+
+    def height(report: dict[str, Any]) -> dict[str, Any]:
+        return next(t for t in report["thresholds"] if t["feature"] == "height")
+
+    usual = coverage.get_coverage(ctx, project["id"])
+    assert height(usual)["rule"] == "quantile"
+    assert [t["suspected"] for t in usual["thresholds"]] == sorted((t["suspected"] for t in usual["thresholds"]), reverse=True)
+    seen = coverage.set_levels(ctx, project["id"], "height", "expert", (5.0, 6.0))
+    assert (height(seen)["low"], height(seen)["high"], height(seen)["rule"]) == (5.0, 6.0, "expert")
+    cells = seen["tables"][0]["cells"]
+    assert {c["state"] for c in (*cells[1], *cells[2])} == {"impossible"}
+    process.set_process(ctx, project["id"], {"without": ["height"]})
+    assert all(t["feature"] != "height" for t in coverage.get_coverage(ctx, project["id"])["thresholds"])
+    process.set_process(ctx, project["id"], {"without": []})
+    assert height(coverage.get_coverage(ctx, project["id"]))["rule"] == "expert"
+    assert height(coverage.set_levels(ctx, project["id"], "height", "range"))["rule"] == "range"
+    reset = height(coverage.set_levels(ctx, project["id"], "height", None))
+    assert {**reset, "suspected": True} == height(usual)  # the interactions went with the feature
+    with pytest.raises(InvalidInput, match="smaller one first"):
+        coverage.set_levels(ctx, project["id"], "height", "expert", (2.0, 1.0))
+    with pytest.raises(UnknownFeature, match="no feature 'colour'"):
+        coverage.set_levels(ctx, project["id"], "colour", "range")
