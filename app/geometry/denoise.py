@@ -3,10 +3,10 @@
 Only for scans: it blurs what is already exact (measured: a clean composite loses a few hundredths of the Rand index).
 """
 
-import numba as nb
 import numpy as np
 
 from app.geometry.cleaning import face_pairs
+from app.geometry.compiled import kernel
 from app.geometry.tool import Array, Mesh
 
 ROUNDS = 20  # of the normals, and again of the vertices
@@ -23,7 +23,7 @@ def denoised(mesh: Mesh) -> Mesh:
     return Mesh(_follow(mesh.vertices.copy(), faces, normals, twice / 2, ROUNDS), mesh.faces)
 
 
-@nb.njit(cache=True)
+@kernel
 def smooth_normals(normals: Array, area: Array, pairs: np.ndarray, rounds: int, crease: float) -> Array:  # pragma: no cover - compiled
     """Normals (F, 3) averaged with those of their neighbours, like with like."""
     now = normals
@@ -49,7 +49,7 @@ def smooth_normals(normals: Array, area: Array, pairs: np.ndarray, rounds: int, 
     return now
 
 
-@nb.njit(cache=True)
+@kernel
 def _follow(vertices: Array, faces: np.ndarray, normals: Array, area: Array, rounds: int) -> Array:  # pragma: no cover - compiled
     """Move each vertex towards the planes of its faces, which pass through their middles (Sun et al. 2007)."""
     weight = np.zeros(len(vertices))

@@ -8,14 +8,15 @@ Any squared-distance-like function is linear in the ten monomials q = (1, x, y, 
 fits only need products u . (sum q q^T) . v. Paper: Sec. V segments with hierarchical fitting primitives (its citation 34).
 """
 
-import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from app.geometry.compiled import kernel
 from app.geometry.tool import Array
 
 _QUADRATIC = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (2, 0, 0), (0, 2, 0), (0, 0, 2), (1, 1, 0), (1, 0, 1), (0, 1, 1))
 _MONOMIALS = sorted({tuple(a + b for a, b in zip(p, q, strict=True)) for p in _QUADRATIC for q in _QUADRATIC}, key=lambda e: (sum(e), e))
+EXPONENT = np.array(_MONOMIALS)
 PRODUCT = np.array([[_MONOMIALS.index(tuple(a + b for a, b in zip(p, q, strict=True))) for q in _QUADRATIC] for p in _QUADRATIC])
 SQUARE = np.array([[4, 7, 8], [7, 5, 9], [8, 9, 6]])  # position in q of x_a x_b
 NORMAL, NORMAL2, NORMAL_CENTRE, AREA, SIZE = 35, 38, 44, 53, 54
@@ -29,24 +30,59 @@ LARGEST_RADIUS = 1e3  # diagonals; flatter is a plane
 
 def face_sums(vertices: Array, faces: NDArray[np.integer]) -> Array:
     """The 54 numbers of every face (F, 54); vertices should be centred and of unit size."""
-    corners = vertices[faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    twice = np.linalg.norm(normal, axis=1)
-    area = twice / 2
-    normal = normal / np.maximum(twice, 1e-300)[:, None]
-    power = np.stack([corners**d for d in range(5)], axis=-1)  # (F, 3, 3, 5)
-    sums = np.empty((len(faces), SIZE))
-    for at, (i, j, k) in enumerate(_MONOMIALS):
-        sums[:, at] = area / 3 * (power[:, :, 0, i] * power[:, :, 1, j] * power[:, :, 2, k]).sum(axis=1)
-    sums[:, NORMAL:NORMAL2] = area[:, None] * normal
-    for at, (a, b) in enumerate(((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))):
-        sums[:, NORMAL2 + at] = area * normal[:, a] * normal[:, b]
-    sums[:, NORMAL_CENTRE:AREA] = (area[:, None, None] * normal[:, :, None] * corners.mean(axis=1)[:, None, :]).reshape(-1, 9)
-    sums[:, AREA] = area
+    return _sums_of(np.ascontiguousarray(vertices, np.float64), np.ascontiguousarray(faces, np.int64))
+
+
+@kernel
+def _sums_of(vertices, faces):  # pragma: no cover - compiled
+    sums, power, side = np.zeros((len(faces), SIZE)), np.ones((3, 5)), np.empty((2, 3))
+    for f in range(len(faces)):
+        a, m = faces[f, 0], sums[f]
+        for c in range(3):
+            side[0, c] = vertices[faces[f, 1], c] - vertices[a, c]
+            side[1, c] = vertices[faces[f, 2], c] - vertices[a, c]
+        twice = 0.0
+        for c in range(3):
+            d, e = (c + 1) % 3, (c + 2) % 3
+            m[NORMAL + c] = side[0, d] * side[1, e] - side[0, e] * side[1, d]
+            twice += m[NORMAL + c] * m[NORMAL + c]
+        area = np.sqrt(twice) / 2
+        m[AREA] = area
+        for v in faces[f]:
+            for c in range(3):
+                for degree in range(1, 5):
+                    power[c, degree] = power[c, degree - 1] * vertices[v, c]
+            for at in range(NORMAL):
+                m[at] += area / 3 * power[0, EXPONENT[at, 0]] * power[1, EXPONENT[at, 1]] * power[2, EXPONENT[at, 2]]
+        for c in range(3):
+            m[NORMAL + c] /= 2  # area times unit normal
+            middle = (vertices[a, c] + vertices[faces[f, 1], c] + vertices[faces[f, 2], c]) / 3
+            for d in range(3):
+                m[NORMAL_CENTRE + 3 * d + c] = middle
+        for c in range(3):
+            for d in range(3):
+                m[NORMAL_CENTRE + 3 * c + d] *= m[NORMAL + c]
+                if c <= d and area > 0:
+                    m[NORMAL2 + NORMAL2_AT[c, d]] = m[NORMAL + c] * m[NORMAL + d] / area
     return sums
 
 
-@nb.njit(cache=True)
+def add_up(sums: Array, label: NDArray[np.integer]) -> Array:
+    """Sums per label (max + 1, 54); faces with label -1 are left out."""
+    return _added(sums, np.ascontiguousarray(label, np.int64), int(label.max()) + 1)
+
+
+@kernel
+def _added(sums, label, n):  # pragma: no cover - compiled
+    total = np.zeros((n, sums.shape[1]))
+    for f in range(len(label)):
+        if label[f] >= 0:
+            for k in range(sums.shape[1]):
+                total[label[f], k] += sums[f, k]
+    return total
+
+
+@kernel
 def smallest_eigen(s, vector):  # pragma: no cover - compiled
     """Smallest eigenvalue of the symmetric s (3, 3), which is overwritten; fills its unit eigenvector (cyclic Jacobi)."""
     u = np.eye(3)
@@ -78,7 +114,7 @@ def smallest_eigen(s, vector):  # pragma: no cover - compiled
     return s[least, least]
 
 
-@nb.njit(cache=True)
+@kernel
 def solve3(a, b):  # pragma: no cover - compiled
     """Cramer's rule, b becomes the solution; False when singular."""
     c00 = a[1, 1] * a[2, 2] - a[1, 2] * a[2, 1]
@@ -94,7 +130,7 @@ def solve3(a, b):  # pragma: no cover - compiled
     return True
 
 
-@nb.njit(cache=True)
+@kernel
 def round_fit(m, across, spread, g, centre):  # pragma: no cover - compiled
     """Algebraic sphere (across = identity) or cylinder (across drops the axis): int (s - 2 c.x - d)^2 / (4 r^2).
 
@@ -140,7 +176,7 @@ def round_fit(m, across, spread, g, centre):  # pragma: no cover - compiled
     return max(error, 0.0) / (4 * r2), np.sqrt(r2)
 
 
-@nb.njit(cache=True)
+@kernel
 def fit(m, weight, out):  # pragma: no cover - compiled
     """Cost of the best primitive: int distance^2 + weight^2 int |n - n_primitive|^2.
 

@@ -4,11 +4,11 @@ import io
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
 from app.errors import InvalidInput
+from app.geometry.compiled import kernel
 from app.geometry.tool import Array
 
 Integers = NDArray[np.int64]
@@ -106,7 +106,7 @@ def _numbered(names: Integers) -> Integers:
     return np.argsort(np.argsort(first))[inverse.ravel()].astype(np.int64)
 
 
-@nb.njit(cache=True)
+@kernel
 def _tops(merges, keep, leaves):  # pragma: no cover - compiled
     """Highest cluster above each leaf that is kept whole; a kept merge keeps all below it."""
     total = leaves + len(merges)
@@ -123,7 +123,7 @@ def _tops(merges, keep, leaves):  # pragma: no cover - compiled
     return top[:leaves]
 
 
-@nb.njit(cache=True)
+@kernel
 def _sound(merges, costs, areas, tolerance):  # pragma: no cover - compiled
     """Merges of which neither they nor any below exceed the tolerance."""
     leaves = len(areas) - len(merges)
@@ -143,7 +143,7 @@ def _sound(merges, costs, areas, tolerance):  # pragma: no cover - compiled
     return sound[leaves:]
 
 
-@nb.njit(cache=True)
+@kernel
 def sums_up(merges, weight):  # pragma: no cover - compiled
     """Sum of the leaves' weights below each cluster."""
     leaves = len(weight)
@@ -154,7 +154,7 @@ def sums_up(merges, weight):  # pragma: no cover - compiled
     return total
 
 
-@nb.njit(cache=True)
+@kernel
 def _below(merges, node, leaves):  # pragma: no cover - compiled
     """Leaves below a cluster, as a mask."""
     inside = np.zeros(leaves + len(merges), np.bool_)

@@ -6,9 +6,9 @@ only computed again when it comes to the top. Then a textbook greedy's neighbour
 
 from collections.abc import Callable
 
-import numba as nb
 import numpy as np
 
+from app.geometry.compiled import kernel
 from app.geometry.fitting import AREA, NORMAL_WEIGHT
 from app.geometry.merge_tree import Integers, MergeTree, sums_up
 from app.geometry.quadrics import fit_any
@@ -18,7 +18,7 @@ CHUNK = 20_000  # merges between two progress reports
 RICH_BELOW = 3_000  # clusters left from which general quadrics are fitted too: they take longer, and small clusters need none
 
 
-@nb.njit(cache=True)
+@kernel
 def _push(key, pair, n, k, a, b):  # pragma: no cover - compiled
     i = n
     while i > 0:
@@ -32,7 +32,7 @@ def _push(key, pair, n, k, a, b):  # pragma: no cover - compiled
     return n + 1
 
 
-@nb.njit(cache=True)
+@kernel
 def _pop(key, pair, n):  # pragma: no cover - compiled
     n -= 1
     k, a, b, i = key[n], pair[n, 0], pair[n, 1], 0
@@ -51,7 +51,7 @@ def _pop(key, pair, n):  # pragma: no cover - compiled
     return n
 
 
-@nb.njit(cache=True)
+@kernel
 def _root(parent, x):  # pragma: no cover - compiled
     top = x
     while parent[top] != top:
@@ -61,7 +61,7 @@ def _root(parent, x):  # pragma: no cover - compiled
     return top
 
 
-@nb.njit(cache=True)
+@kernel
 def _first_time(table, a, b, total):  # pragma: no cover - compiled
     """Remember the pair in an open-addressing hash table; False when it was there."""
     value = a * total + b + 1
@@ -75,7 +75,7 @@ def _first_time(table, a, b, total):  # pragma: no cover - compiled
     return True
 
 
-@nb.njit(cache=True)
+@kernel
 def _fill(sums, slot, pairs, weight, rich, key, heap_pair):  # pragma: no cover - compiled
     out, n = np.empty(5), 0
     for e in range(len(pairs)):
@@ -84,7 +84,7 @@ def _fill(sums, slot, pairs, weight, rich, key, heap_pair):  # pragma: no cover 
     return n
 
 
-@nb.njit(cache=True)
+@kernel
 def _advance(sums, slot, parent, key, heap_pair, n, table, weight, rich, merges, costs, done, until):  # pragma: no cover - compiled
     """Merge until `until` merges are done or nothing is left; returns (heap size, merges done)."""
     leaves, total = len(sums), len(parent)
@@ -146,3 +146,48 @@ def build_tree(sums: Array, leaf: Integers, pairs: Integers, progress: Callable[
             n, done = _advance(work, slot, parent, key, heap_pair, n, table, weight, rich, merges, costs, done, stop)
             progress(done / max(1, leaves - 1))
     return MergeTree(leaf.astype(np.int64), merges[:done].copy(), costs[:done].copy(), sums_up(merges[:done], sums[:, AREA]))
+
+
+@kernel
+def absorb_small(sums, pairs, least, wanted, weight):  # pragma: no cover - compiled
+    """Give clusters below a share `least` of the area, smallest first, to the neighbour they fit best while more than `wanted` are left.
+
+    Returns the cluster that each one belongs to then (P,), -1 for small ones without a neighbour.
+    """
+    n, out = len(sums), np.empty(5)
+    total, pairs, into, alive = sums.copy(), pairs.copy(), np.arange(n), np.ones(n, np.bool_)
+    area, left = total[:, AREA].sum(), n
+    own = np.full(n, -1.0)  # cost of each cluster, once it is needed
+    while left > max(wanted, 1):
+        small = -1
+        for k in range(n):
+            if alive[k] and (small < 0 or total[k, AREA] < total[small, AREA]):
+                small = k
+        if total[small, AREA] >= least * area:
+            break
+        best, lowest = -1, np.inf
+        for e in range(len(pairs)):
+            if (pairs[e, 0] == small) != (pairs[e, 1] == small):
+                other = pairs[e, 0] + pairs[e, 1] - small
+                if other == best:
+                    continue
+                if own[other] < 0:
+                    own[other] = fit_any(total[other], weight, True, out)
+                extra = fit_any(total[small] + total[other], weight, True, out) - own[other]
+                if extra < lowest or (extra == lowest and other < best):
+                    best, lowest = other, extra
+        alive[small] = False
+        left -= 1
+        if best < 0:
+            area -= total[small, AREA]
+        else:
+            total[best] += total[small]
+            own[best] = -1.0
+        for k in range(n):
+            if into[k] == small:
+                into[k] = best
+        for e in range(len(pairs)):
+            for side in range(2):
+                if pairs[e, side] == small:
+                    pairs[e, side] = best
+    return into

@@ -5,9 +5,9 @@ gradient is asked to be the unit normal, f is nearly a distance, and what is lef
 freeform patches (ellipsoids, saddles, ruled patches), which no other primitive fits.
 """
 
-import numba as nb
 import numpy as np
 
+from app.geometry.compiled import kernel
 from app.geometry.fitting import AREA, NO_FIT, NORMAL, NORMAL2, NORMAL2_AT, NORMAL_CENTRE, PRODUCT, SQUARE, fit, smallest_eigen, solve3
 
 CONE, QUADRIC = 3, 4
@@ -45,7 +45,7 @@ _SLOPE_AT = np.array([t[:2] for t in _SLOPES])
 _SLOPE_BY = np.array([t[2] for t in _SLOPES])
 
 
-@nb.njit(cache=True)
+@kernel
 def _solve_spd(a, b):  # pragma: no cover - compiled
     """Cholesky: b becomes the solution of a b = b for a symmetric positive definite (lower half used); False when it is not."""
     n = len(b)
@@ -73,7 +73,7 @@ def _solve_spd(a, b):  # pragma: no cover - compiled
     return True
 
 
-@nb.njit(cache=True)
+@kernel
 def fit_quadric(m, weight, q):  # pragma: no cover - compiled
     """Cost of the best general quadric; fills its ten coefficients."""
     a, right = np.empty((10, 10)), np.zeros(10)
@@ -95,7 +95,7 @@ def fit_quadric(m, weight, q):  # pragma: no cover - compiled
     return max(square * m[AREA] - gained, 0.0)
 
 
-@nb.njit(cache=True)
+@kernel
 def fit_cone(m, weight, out):  # pragma: no cover - compiled
     """Cost of the best circular cone; fills curvature at the middle (signed, 1 / distance to the axis along the normal) and axis.
 
@@ -173,7 +173,7 @@ def fit_cone(m, weight, out):  # pragma: no cover - compiled
     return error / (4 * steep2) + weight * weight * (area * astray + varying)
 
 
-@nb.njit(cache=True)
+@kernel
 def fit_any(m, weight, freeform, out):  # pragma: no cover - compiled
     """Cost of the best of all primitives (`freeform`: a general quadric too).
 
@@ -195,7 +195,7 @@ def fit_any(m, weight, freeform, out):  # pragma: no cover - compiled
     return best
 
 
-@nb.njit(cache=True)
+@kernel
 def misfit(sums, q, weight):  # pragma: no cover - compiled
     """int f^2 + weight^2 int |grad f - n|^2 of each row of sums (F, 54) for a given quadric q."""
     square, result = weight * weight, np.empty(len(sums))

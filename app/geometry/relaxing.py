@@ -4,9 +4,9 @@ What a face would cost in each region is linear in its 54 numbers. A face alone 
 averaged along the surface.
 """
 
-import numba as nb
 import numpy as np
 
+from app.geometry.compiled import kernel
 from app.geometry.denoise import smooth_normals
 from app.geometry.fitting import AREA, CYLINDER, NORMAL, PLANE, PRODUCT, SIZE, SPHERE, SQUARE, round_fit
 from app.geometry.merge_tree import Integers
@@ -77,7 +77,7 @@ def _surface(m: Array, weight: float) -> Array:
     return q
 
 
-@nb.njit(cache=True)
+@kernel
 def _averaged(cost: Array, area: Array, pairs: Integers, like: Array, rounds: int) -> Array:  # pragma: no cover - compiled
     """Costs per area (F, K), averaged along the surface."""
     now = cost / area.reshape(-1, 1)
@@ -96,7 +96,7 @@ def _averaged(cost: Array, area: Array, pairs: Integers, like: Array, rounds: in
     return now
 
 
-@nb.njit(cache=True)
+@kernel
 def _near(labels: Integers, pairs: Integers, n: int, rounds: int) -> np.ndarray:  # pragma: no cover - compiled
     """Regions (F, n) a face may join: those within a few triangles."""
     near = np.zeros((len(labels), n), np.bool_)

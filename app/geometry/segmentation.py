@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from app.errors import InvalidInput, UnreadableMesh
 from app.geometry.cleaning import areas, face_pairs
 from app.geometry.denoise import denoised
-from app.geometry.fitting import AREA, NORMAL_WEIGHT, PLANE, PRODUCT, SIZE, face_sums
+from app.geometry.fitting import AREA, NORMAL_WEIGHT, PLANE, PRODUCT, add_up, face_sums
 from app.geometry.importing import ImportedPart
 from app.geometry.merge_tree import Integers, MergeTree
-from app.geometry.merging import build_tree
+from app.geometry.merging import absorb_small, build_tree
 from app.geometry.quadrics import fit_any
 from app.geometry.relaxing import relaxed
 from app.geometry.splitting import LARGE, Surface, connected, split_large
@@ -58,7 +58,25 @@ class Cut:
     source: Integers  # (F,) face of the part as it came that each face is, or is a piece of
 
 
-def segment(part: ImportedPart, parameters: SegmentationParameters, report: Report = ignore, tree: MergeTree | None = None) -> Cut:
+@dataclass(frozen=True)
+class Patches:
+    """What a part's working surface is made of before patches are merged to the number of regions wanted.
+
+    It depends on the part, the tolerance and the denoise switch alone: made once, a slider from few to many only merges and cuts.
+    """
+
+    labels: Integers  # (F,) patch of each face, -1 outside the working surface
+    sums: Array  # (P, 54) numbers of each patch, for fitting
+    pairs: Integers  # (Q, 2) neighbouring patches
+
+
+def segment(
+    part: ImportedPart,
+    parameters: SegmentationParameters,
+    report: Report = ignore,
+    tree: MergeTree | None = None,
+    patches: Patches | None = None,
+) -> Cut:
     """Find the regions of a part's working surface.
 
     Args:
@@ -66,50 +84,62 @@ def segment(part: ImportedPart, parameters: SegmentationParameters, report: Repo
         parameters: How finely to cut.
         report: Told the progress.
         tree: The merge tree of this very part (`part_tree`) where it was kept: then only the cut is made anew.
+        patches: Of this part and tree, with these parameters (`find_patches`), where they were kept.
 
     Raises:
         InvalidInput: A parameter is out of range.
         UnreadableMesh: Nothing of the part can be reached from above.
     """
     _check(parameters)
-    mesh = part.mesh
-    report(0.0, "Looking for neighbouring triangles")
-    pairs = face_pairs(mesh.faces)
-    sums = unit_sums(_fitted(part, parameters))
-    tree = tree or part_tree(part, lambda f: report(0.1 + 0.7 * f, "Fitting planes, cylinders, spheres and cones"), parameters.denoise)
-    report(0.8, "Finding what can be reached from above")
-    seen = reachable(mesh)
-    labels = _working_patches(tree.cut(tolerance=parameters.tolerance), seen, sums[:, AREA], pairs)
+    tree = tree or part_tree(part, lambda f: report(0.7 * f, "Fitting planes, cylinders, spheres and cones"), parameters.denoise)
+    report(0.7, "Finding what can be reached from above")
+    patches = patches or find_patches(part, parameters, tree)
     report(0.85, "Merging small pieces")
-    similar = parameters.preset == "paper-like"
-    if parameters.absorb_fillets or similar:
-        labels = _absorb_fillets(labels, sums, pairs)
-    smallest = SIMILAR_LEAST if similar else parameters.minimum_area
-    labels = _merge_small(labels, sums, pairs, smallest, parameters.target or 1)
-    wanted = parameters.target or parameters.most
-    labels = _merge_down(labels, sums, pairs, wanted)
+    labels = _to_regions(patches, parameters)
     if parameters.denoise and (part.cad_face < 0).all():
-        labels = relaxed(labels, sums, pairs, NORMAL_WEIGHT)
+        labels = relaxed(labels, unit_sums(_fitted(part, True)), face_pairs(part.mesh.faces), NORMAL_WEIGHT)
     report(0.9, "Cutting large pieces")
+    wanted = parameters.target or parameters.most
     least = min(parameters.target or LEAST_REGIONS, wanted)
-    start = Surface(mesh.vertices, mesh.faces.astype(np.int64), part.cad_face, labels, np.arange(len(labels)))
-    surface = split_large(start, least, wanted, SIMILAR_MOST if similar else LARGE)
+    start = Surface(part.mesh.vertices, part.mesh.faces.astype(np.int64), part.cad_face, labels, np.arange(len(labels)))
+    surface = split_large(start, least, wanted, SIMILAR_MOST if parameters.preset == "paper-like" else LARGE)
     report(1.0, f"{surface.labels.max() + 1} regions")
     finer = replace(part, mesh=Mesh(surface.vertices, surface.faces.astype(np.int32)), cad_face=surface.cad_face)
     return Cut(finer, surface.labels.astype(np.int32), tree.on(surface.source), surface.source)
+
+
+def find_patches(part: ImportedPart, parameters: SegmentationParameters, tree: MergeTree) -> Patches:
+    """The patches of a part that its tolerance asks for, and that can be reached."""
+    pairs, sums = face_pairs(part.mesh.faces), unit_sums(_fitted(part, parameters.denoise))
+    labels = _working_patches(tree.cut(tolerance=parameters.tolerance), reachable(part.mesh), sums[:, AREA])
+    return Patches(labels, add_up(sums, labels), _label_pairs(labels, pairs))
+
+
+def _to_regions(patches: Patches, parameters: SegmentationParameters) -> Integers:
+    """Region of each face (F,): patches merged as far as is wanted."""
+    sums, pairs, into = patches.sums, patches.pairs, np.arange(len(patches.sums))
+    similar, wanted = parameters.preset == "paper-like", parameters.target or parameters.most
+    if parameters.absorb_fillets or similar:
+        into = _absorb_fillets(sums, pairs)
+        sums, pairs = add_up(sums, into), _label_pairs(into, pairs)
+    smallest = SIMILAR_LEAST if similar else parameters.minimum_area
+    kept = _numbered(absorb_small(sums, pairs, smallest, parameters.target or 1, NORMAL_WEIGHT))
+    into, sums, pairs = kept[into], add_up(sums, kept), _label_pairs(kept, pairs)
+    if len(sums) > wanted:
+        into = np.where(into >= 0, build_tree(sums, np.arange(len(sums)), pairs, lambda _: None).cut(wanted)[into], -1)
+    return np.where(patches.labels >= 0, into[patches.labels], -1)
 
 
 def part_tree(part: ImportedPart, progress: Callable[[float], None] = lambda _: None, denoise: bool = False) -> MergeTree:
     """Merge the faces of a part, or its CAD faces, until each connected piece is one cluster."""
     pairs = face_pairs(part.mesh.faces)
     leaf = _first_clusters(part.cad_face, pairs)
-    sums = unit_sums(_fitted(part, SegmentationParameters(denoise=denoise)))
-    return build_tree(_add_up(sums, leaf), leaf, leaf[pairs], progress)
+    return build_tree(add_up(unit_sums(_fitted(part, denoise)), leaf), leaf, leaf[pairs], progress)
 
 
-def _fitted(part: ImportedPart, parameters: SegmentationParameters) -> Mesh:
+def _fitted(part: ImportedPart, denoise: bool) -> Mesh:
     """The mesh to which primitives are fitted; a file with CAD faces is no scan."""
-    return denoised(part.mesh) if parameters.denoise and (part.cad_face < 0).all() else part.mesh
+    return denoised(part.mesh) if denoise and (part.cad_face < 0).all() else part.mesh
 
 
 def _check(parameters: SegmentationParameters) -> None:
@@ -130,29 +160,22 @@ def unit_sums(mesh: Mesh) -> Array:
     return face_sums((mesh.vertices - middle) / np.sqrt(12 * spread), mesh.faces)
 
 
-def _add_up(sums: Array, label: NDArray[np.integer]) -> Array:
-    """Sums per label; faces with label -1 are left out."""
-    total = np.zeros((int(label.max()) + 1, SIZE))
-    np.add.at(total, label[label >= 0], sums[label >= 0])
-    return total
-
-
 def _first_clusters(cad_face: NDArray[np.int32], pairs: Integers) -> Integers:
     """Leaf of each face: its CAD face, or the face itself where there is none."""
     alone = cad_face.max(initial=-1) + 1 + np.arange(len(cad_face))
     return connected(np.where(cad_face >= 0, cad_face, alone), pairs)
 
 
-def _working_patches(patch: Integers, seen: NDArray[np.bool_], area: Array, pairs: Integers) -> Integers:
+def _working_patches(patch: Integers, seen: NDArray[np.bool_], area: Array) -> Integers:
     """Keep whole patches of which more than half can be reached."""
     share = np.bincount(patch, weights=area * seen) / np.bincount(patch, weights=area)
-    keep = (share > 0.5)[patch]
+    keep = share > 0.5
     if not keep.any():
         raise UnreadableMesh("Nothing of the part can be reached from above. Choose another up-direction.")
-    return _renumber(np.where(keep, patch, -1))
+    return np.where(keep, np.cumsum(keep) - 1, -1)[patch]
 
 
-def _renumber(labels: Integers) -> Integers:
+def _numbered(labels: Integers) -> Integers:
     """Labels 0, 1, ... without gaps; -1 stays."""
     result = np.full(len(labels), -1, np.int64)
     inside = labels >= 0
@@ -164,63 +187,27 @@ def _label_pairs(labels: Integers, pairs: Integers) -> Integers:
     """Neighbouring labels (Q, 2), each pair once."""
     both = labels[pairs]
     both = both[(both >= 0).all(axis=1) & (both[:, 0] != both[:, 1])]
-    return np.unique(np.sort(both, axis=1), axis=0)
+    n = int(labels.max()) + 1
+    key = np.unique(both.min(axis=1) * n + both.max(axis=1))
+    return np.stack([key // n, key % n], axis=1)
 
 
-def _absorb_fillets(labels: Integers, sums: Array, pairs: Integers) -> Integers:
-    """Give each narrow bent region to the larger neighbour that it fits best."""
-    total, touching = _add_up(sums, labels), _label_pairs(labels, pairs)
-    out, into = np.empty(5), np.arange(len(total))
-    for k in np.argsort(total[:, AREA]):
-        m, others = total[k], np.unique(touching[(touching == k).any(axis=1)])
-        others = others[(others != k) & (total[others, AREA] > m[AREA])]
+def _absorb_fillets(sums: Array, touching: Integers) -> Integers:
+    """What each patch becomes when every narrow bent one goes to the larger neighbour that it fits best."""
+    out, into = np.empty(5), np.arange(len(sums))
+    for k in np.argsort(sums[:, AREA]):
+        m, others = sums[k], np.unique(touching[(touching == k).any(axis=1)])
+        others = others[(others != k) & (sums[others, AREA] > m[AREA])]
         fit_any(m, NORMAL_WEIGHT, True, out)
         middle = m[PRODUCT[0, 1:4]] / m[0]
         along = np.sqrt(12 * np.linalg.eigvalsh(m[PRODUCT[1:4, 1:4]] / m[0] - np.outer(middle, middle))[-1])
         if out[0] == PLANE or len(others) < 2 or m[AREA] / along > FILLET_WIDTH:
             continue
-        into[k] = others[int(np.argmin([_cost(m + total[o]) - _cost(total[o]) for o in others]))]
+        into[k] = others[int(np.argmin([_cost(m + sums[o]) - _cost(sums[o]) for o in others]))]
     while (into != into[into]).any():
         into = into[into]
-    return _renumber(np.where(labels >= 0, into[labels], -1))
-
-
-def _merge_small(labels: Integers, sums: Array, pairs: Integers, minimum_area: float, wanted: int) -> Integers:
-    """Give regions below the minimum area, smallest first, to the neighbour they fit best while there are more than wanted.
-
-    A region without a neighbour is dropped from the working surface.
-    """
-    total, touching = _add_up(sums, labels), _label_pairs(labels, pairs)
-    into = np.arange(len(total))
-    alive = np.ones(len(total), bool)
-    while alive.sum() > wanted:
-        area = np.where(alive, total[:, AREA], np.inf)
-        small = int(np.argmin(area))
-        if area[small] >= minimum_area * total[alive, AREA].sum() or alive.sum() == 1:
-            break
-        others = touching[(touching == small).any(axis=1)]
-        others = np.unique(others[others != small])
-        alive[small] = False
-        if len(others) == 0:
-            into[into == small] = -1
-            continue
-        extra = [_cost(total[small] + total[o]) - _cost(total[o]) for o in others]
-        best = int(others[int(np.argmin(extra))])
-        total[best] += total[small]
-        into[into == small] = best
-        touching = np.where(touching == small, best, touching)
-        touching = touching[touching[:, 0] != touching[:, 1]]
-    return _renumber(np.where(labels >= 0, into[labels], -1))
+    return _numbered(into)
 
 
 def _cost(sums: Array) -> float:
     return float(fit_any(sums, NORMAL_WEIGHT, True, np.empty(5)))
-
-
-def _merge_down(labels: Integers, sums: Array, pairs: Integers, wanted: int) -> Integers:
-    """Merge on until at most `wanted` regions are left."""
-    if labels.max() + 1 <= wanted:
-        return labels
-    total = _add_up(sums, labels)
-    joined = build_tree(total, np.arange(len(total)), _label_pairs(labels, pairs), lambda _: None).cut(wanted)
-    return np.where(labels >= 0, joined[labels], -1)

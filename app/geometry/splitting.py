@@ -15,6 +15,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, QhullError
 
 from app.geometry.cleaning import areas, face_pairs
+from app.geometry.compiled import kernel
 from app.geometry.tool import Array
 
 Integers = NDArray[np.int64]
@@ -22,6 +23,7 @@ ON_PLANE = 1e-5  # share of the diagonal within which a vertex lies on the cutti
 LARGE = 0.2  # regions with a larger share of the working surface are cut
 SCRAP = 0.35  # pieces below this share of an equal part go to the piece they share most border with
 UNEVEN, EXTRA = 0.3, 0.3  # what rows of different length and one part too many cost, against the log aspect of a part
+SWEEP = 257  # places at which the area before is known
 ROUNDS = 4  # scraps leave fewer parts than planned; so often we cut again
 
 
@@ -51,9 +53,35 @@ def split_large(surface: Surface, least: int, most: int, large: float = LARGE) -
             break
         room = most - int(parts.sum())
         for region in np.flatnonzero(parts > 1):
-            surface, extra = _split(surface, int(region), int(parts[region]), room > 0)
+            near, others = _taken_out(surface, int(region))
+            free = int(surface.labels.max()) + 1
+            near, extra = _split(near, int(region), int(parts[region]), room > 0, free)
+            surface = _put_back(near, others)
             room -= extra
     return surface
+
+
+def _taken_out(surface: Surface, region: int) -> tuple[Surface, Surface]:
+    """The faces of a region with all that touch them, and the rest: cutting the few is quicker than cutting all."""
+    mark = np.zeros(len(surface.vertices), bool)
+    mark[surface.faces[surface.labels == region]] = True
+    near = mark[surface.faces].any(axis=1)
+    return _chosen(surface, near), _chosen(surface, ~near)
+
+
+def _chosen(surface: Surface, which: NDArray[np.bool_]) -> Surface:
+    return Surface(surface.vertices, surface.faces[which], surface.cad_face[which], surface.labels[which], surface.source[which])
+
+
+def _put_back(near: Surface, others: Surface) -> Surface:
+    """The whole surface again; new vertices came behind the old ones."""
+    return Surface(
+        near.vertices,
+        np.concatenate([others.faces, near.faces]),
+        np.concatenate([others.cad_face, near.cad_face]),
+        np.concatenate([others.labels, near.labels]),
+        np.concatenate([others.source, near.source]),
+    )
 
 
 def connected(group: NDArray[np.integer], pairs: Integers) -> Integers:
@@ -69,21 +97,33 @@ def cut_by_plane(surface: Surface, region: int, normal: Array, offset: float) ->
     height = surface.vertices @ normal - offset
     height[np.abs(height) < ON_PLANE * np.linalg.norm(np.ptp(surface.vertices, axis=0))] = 0
     total = len(surface.vertices)
-    edges = np.sort(np.stack([surface.faces, np.roll(surface.faces, -1, axis=1)], axis=-1), axis=-1)  # (F, 3, 2)
-    keys = edges[..., 0] * total + edges[..., 1]
-    inside = surface.labels == region
-    crossed = np.unique(keys[inside][height[edges[inside]].prod(axis=-1) < 0])
+    inside = surface.faces[surface.labels == region]
+    following = np.roll(inside, -1, axis=1)
+    across = height[inside] * height[following] < 0
+    ends = np.sort(np.stack([inside[across], following[across]], axis=1), axis=1)
+    crossed = np.unique(ends[:, 0] * total + ends[:, 1])
     if len(crossed) == 0:
         return surface
     low, high = crossed // total, crossed % total
     along = height[low] / (height[low] - height[high])
     points = surface.vertices[low] + along[:, None] * (surface.vertices[high] - surface.vertices[low])
+    middle = _at_new_vertices(surface.faces, low, high, total)
+    vertices = np.concatenate([surface.vertices, points])
+    faces, source = _subdivide(surface.faces, middle, vertices)
+    return Surface(vertices, faces, surface.cad_face[source], surface.labels[source], surface.source[source])
+
+
+def _at_new_vertices(faces: Integers, low: Integers, high: Integers, total: int) -> Integers:
+    """New vertex on each side of each face (F, 3), -1 without; new vertex k lies on the edge from low[k] to high[k]."""
+    crossed, mark = low * total + high, np.zeros(total, bool)
+    mark[low] = mark[high] = True
+    middle = np.full(faces.shape, -1, np.int64)
+    near = np.flatnonzero(mark[faces].sum(axis=1) > 1)
+    corners, following = faces[near], np.roll(faces[near], -1, axis=1)
+    keys = np.minimum(corners, following) * total + np.maximum(corners, following)
     at = np.minimum(np.searchsorted(crossed, keys), len(crossed) - 1)
-    middle = np.where(crossed[at] == keys, total + at, -1)
-    faces, source = _subdivide(surface.faces, middle, np.concatenate([surface.vertices, points]))
-    return Surface(
-        np.concatenate([surface.vertices, points]), faces, surface.cad_face[source], surface.labels[source], surface.source[source]
-    )
+    middle[near] = np.where(crossed[at] == keys, total + at, -1)
+    return middle
 
 
 def _subdivide(faces: Integers, middle: Integers, vertices: Array) -> tuple[Integers, Integers]:
@@ -115,8 +155,8 @@ def _parts(shares: Array, least: int, most: int, large: float) -> Integers:
     return parts
 
 
-def _split(surface: Surface, region: int, parts: int, spare: bool) -> tuple[Surface, int]:
-    """Cut one region into parts, one more when that is `spare` and fits better; also how many more."""
+def _split(surface: Surface, region: int, parts: int, spare: bool, free: int) -> tuple[Surface, int]:
+    """Cut one region into parts named from `free` on, one more when that is `spare` and fits better; also how many more."""
     frame, size = rectangle(surface, region)
     planned, rows = _layout(parts, size[0] / max(size[1], 1e-9 * size[0]), spare)
     per_row = [planned // rows + (r < planned % rows) for r in range(rows)]
@@ -128,7 +168,7 @@ def _split(surface: Surface, region: int, parts: int, spare: bool) -> tuple[Surf
         cells = row * per_row[0] + _cell(surface, inside, frame[1], columns)
     else:
         surface, cells = _cut_rows(surface, region, frame, marked, per_row)
-    return _gather(surface, region, cells, planned), planned - parts
+    return _gather(surface, region, cells, planned, free), planned - parts
 
 
 def _cut_rows(surface: Surface, region: int, frame: Array, marked: Array, per_row: list[int]) -> tuple[Surface, Integers]:
@@ -162,16 +202,26 @@ def _cut_along(surface: Surface, region: int, direction: Array, fractions: Array
 
 def quantiles(corners: Array, area: Array, fractions: Array) -> Array:
     """Positions with the given fractions of the area before, by a sweep that spreads each triangle from end to end."""
-    low, high = corners.min(), corners.max()
-    grid = np.linspace(low, high, 257)
-    first, middle, last = np.sort(corners, axis=1).T
-    before = np.zeros(len(grid))
-    for at, x in enumerate(grid):
-        rising = np.clip(x - first, 0, None) ** 2 / np.maximum((last - first) * (middle - first), 1e-300)
-        falling = 1 - np.clip(last - x, 0, None) ** 2 / np.maximum((last - first) * (last - middle), 1e-300)
-        share = np.where(x <= middle, rising, falling)
-        before[at] = (area * np.where(x >= last, 1.0, np.where(x <= first, 0.0, share))).sum()
-    return np.interp(fractions * area.sum(), before, grid)
+    grid = np.linspace(corners.min(), corners.max(), SWEEP)
+    return np.interp(fractions * area.sum(), _area_before(np.sort(corners, axis=1), area, grid), grid)
+
+
+@kernel
+def _area_before(corners, area, grid):  # pragma: no cover - compiled
+    """Area of triangles with sorted corner positions (F, 3) before each place of the grid."""
+    before, whole = np.zeros(len(grid)), np.zeros(len(grid) + 1)
+    for f in range(len(area)):
+        first, middle, last = corners[f]
+        k = np.searchsorted(grid, first)
+        while k < len(grid) and grid[k] < last:
+            x = grid[k]
+            if x <= middle and middle > first:
+                before[k] += area[f] * (x - first) ** 2 / ((last - first) * (middle - first))
+            elif x > middle:
+                before[k] += area[f] * (1 - (last - x) ** 2 / ((last - first) * (last - middle)))
+            k += 1
+        whole[k] += area[f]
+    return before + np.cumsum(whole)[:-1]
 
 
 def _cell(surface: Surface, inside: NDArray[np.bool_], direction: Array, offsets: Array) -> Integers:
@@ -215,7 +265,7 @@ def _layout(parts: int, aspect: float, spare: bool) -> tuple[int, int]:
     return min(choices, key=lambda c: effort(*c))
 
 
-def _gather(surface: Surface, region: int, cells: Integers, parts: int) -> Surface:
+def _gather(surface: Surface, region: int, cells: Integers, parts: int, free: int) -> Surface:
     """Label the connected pieces of the cells; scraps go to the piece of this region they share most border with."""
     inside = np.flatnonzero(surface.labels == region)
     faces = surface.faces[inside]
@@ -234,7 +284,7 @@ def _gather(surface: Surface, region: int, cells: Integers, parts: int) -> Surfa
         border = np.bincount(both[touching].sum(axis=1) - least, weights=length[touching], minlength=len(names))
         piece = np.where(piece == least, int(np.argmax(border)), piece)
     labels = surface.labels.copy()
-    labels[inside] = np.where(piece == 0, region, labels.max() + piece)
+    labels[inside] = np.where(piece == 0, region, free - 1 + piece)
     return replace(surface, labels=labels)
 
 
