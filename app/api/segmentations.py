@@ -50,6 +50,9 @@ class SegmentationOrder(Body):
         Id | None, Field(description="The cut the edit was made on; refused when it is no longer the current one.")
     ] = None
     now: Annotated[bool, Field(description="Answer at once from the kept merges instead of in the background.")] = False
+    continues: Annotated[
+        bool, Field(description="Like the cut before, made by the same drag of a slider: with it one step of the history. Needs `now`.")
+    ] = False
     target: Annotated[int, Field(ge=1, le=MOST_TARGET, description="Regions wanted; left out: decided by the tolerance.")] | None = None
     tolerance: Annotated[float, Field(gt=0, lt=1, description="Fit error allowed, relative to the part's size.")] | None = None
     minimum_area: Annotated[float, Field(ge=0, le=0.5, description="Smaller shares of the working surface go to a neighbour.")] | None = (
@@ -123,9 +126,9 @@ def segment_tool(ctx: Ctx, tool_id: str, body: SegmentationOrder, response: Resp
     if body.edit is not None:
         edit = body.edit.model_dump(exclude_unset=True)
         return located(response, "tools", workflow.edit_tool(ctx, tool_id, edit, body.segmentation_id))
-    parameters = body.model_dump(exclude_none=True, exclude={"edit", "segmentation_id", "now"})
+    parameters = body.model_dump(exclude_none=True, exclude={"edit", "segmentation_id", "now", "continues"})
     if body.now:
-        return located(response, "tools", workflow.recut_tool(ctx, tool_id, parameters, body.segmentation_id))
+        return located(response, "tools", workflow.recut_tool(ctx, tool_id, parameters, body.segmentation_id, continues=body.continues))
     response.status_code = 202
     return located(response, "tools", tools.segment_tool(ctx, tool_id, parameters))
 

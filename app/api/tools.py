@@ -67,6 +67,15 @@ class FileBody(Row):
     up_guess: str
 
 
+class SliderRange(Row):
+    """From how few to how many regions a tool can be cut; `now`: at once, from its kept merges."""
+
+    least: int
+    most: int
+    current: int
+    now: bool
+
+
 class EditState(Row):
     """Whether the regions can be edited, what undo and redo would do, what is locked or hidden."""
 
@@ -79,6 +88,7 @@ class EditState(Row):
     editable: bool
     why_not: str | None
     step: int
+    slider: SliderRange | None
 
 
 class ToolAuthor(Row):

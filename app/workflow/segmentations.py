@@ -17,7 +17,7 @@ from app.jobs.rows import unfinished_job
 from app.sequencing.features import feature_set_for
 from app.storage import emit
 from app.storage.conversions import tool_to_bytes
-from app.storage.tables import Demonstration, RegionName, Segmentation, ToolRow
+from app.storage.tables import Demonstration, Draft, Plan, RegionName, Run, Segmentation, ToolRow
 from app.workflow.context import Context
 from app.workflow.editing_views import follow_edit, follow_jump
 from app.workflow.edits import SAME_REGIONS, After, Before, apply
@@ -70,8 +70,11 @@ def rename_region(ctx: Context, tool_id: str, region: int, name: str) -> Json:
     return list_regions(ctx, tool_id)[region]
 
 
-def recut_tool(ctx: Context, tool_id: str, parameters: Json, segmentation_id: str | None = None) -> Json:
+def recut_tool(ctx: Context, tool_id: str, parameters: Json, segmentation_id: str | None = None, *, continues: bool = False) -> Json:
     """Cut the tool anew at once, from the kept merge tree; locked regions stay.
+
+    With `continues` the cut takes the place of the one before in the history, if that was made by a slider too and nothing was
+    done with it.
 
     Raises:
         Conflict: No merge tree is kept; cut it as background work instead.
@@ -101,7 +104,12 @@ def recut_tool(ctx: Context, tool_id: str, parameters: Json, segmentation_id: st
         row, parent = _editable(session, tool_id, "cut")
         _check_unchanged(row, parent, before_id)
         cut = add_cut(session, ctx.store, row, content, tool.n, feature_set_for(tool.graph).name, vars(known))
+        replaced = parent if continues and parent.parent_id and _only_passed(session, parent) else None
+        if replaced is not None:
+            parent = found(session, Segmentation, replaced.parent_id or "", "segmentation")
         _join_history(session, parent, cut, "cut", after)
+        if replaced is not None:
+            session.delete(replaced)
         follow_edit(ctx.values, session, row, after)
         return _tell(session, row, shaped=True)
 
@@ -258,6 +266,18 @@ def _editable(session: Session, tool_id: str, kind: str) -> tuple[ToolRow, Segme
 def _check_unchanged(row: ToolRow, cut: Segmentation, expected: str) -> None:
     if cut.id != expected:
         raise StaleVersion(f"The regions of {row.name} were changed meanwhile. Look at them again, then repeat the edit.")
+
+
+def _only_passed(session: Session, cut: Segmentation) -> bool:
+    """Whether a cut was made by a slider, and nothing refers to it."""
+    if cut.kind != "cut" or cut.params.get("target") is None:
+        return False
+    runs = session.exec(select(Run.interest).join(ToolRow, col(ToolRow.project_id) == Run.project_id).where(ToolRow.id == cut.tool_id))
+    references = (
+        select(col(Segmentation.id)).where(Segmentation.parent_id == cut.id),
+        *(select(col(table.segmentation_id)).where(table.segmentation_id == cut.id) for table in (Demonstration, Draft, Plan, RegionName)),
+    )
+    return not any(session.exec(query).first() for query in references) and not any(cut.id in interest for interest in runs)
 
 
 def _same_regions(session: Session, parent: Segmentation, after: After) -> Segmentation:

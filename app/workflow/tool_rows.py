@@ -4,6 +4,7 @@ from typing import Any
 
 from sqlmodel import Session, col, select
 
+from app.geometry.segmentation import MOST_TARGET
 from app.jobs.rows import job_json, unfinished_job
 from app.storage import Store, emit
 from app.storage.artifacts import keep
@@ -67,7 +68,15 @@ def edit_json(session: Session, row: ToolRow, cut: Segmentation | None) -> Json:
         "editable": why_not is None,
         "why_not": why_not,
         "step": steps_before(session, cut) if cut else 0,
+        "slider": slider_json(row, cut),
     }
+
+
+def slider_json(row: ToolRow, cut: Segmentation | None) -> Json | None:
+    """From how few to how many regions the tool can be cut; None where the regions came with it."""
+    if cut is None or row.part_sha is None:
+        return None
+    return {"least": 1, "most": MOST_TARGET, "current": cut.region_count, "now": row.tree_sha is not None}
 
 
 def steps_before(session: Session, cut: Segmentation) -> int:

@@ -219,11 +219,16 @@ def test_a_tool_stays_as_it_is_while_a_run_learns_from_it(api: Api, tool: dict[s
     assert edit(api, tool, kind="merge", regions=[1, regions(api, tool)[1]["neighbours"][-1]])["edit"]["editable"] is True
 
 
-def test_slider_answers_at_once_and_leaves_locked_regions_alone(api: Api) -> None:
+def imported(api: Api) -> dict[str, Any]:
+    """A box made a tool."""
     project = api.post("/projects", {"name": "Moulds"})
     part = trimesh.creation.box((0.4, 0.3, 0.1)).subdivide().subdivide()
     tool = api.upload(f"/projects/{project['id']}/tools", "Box.stl", part.export(file_type="stl"), units="m", up="+z")
-    tool = api.until(f"/tools/{tool['id']}", lambda row: row["state"] == "ready")
+    return api.until(f"/tools/{tool['id']}", lambda row: row["state"] == "ready")
+
+
+def test_slider_answers_at_once_and_leaves_locked_regions_alone(api: Api) -> None:
+    tool = imported(api)
     assert tool["edit"]["can_undo"] is False
     path = f"/tools/{tool['id']}/segmentations"
     six = api.post(path, {"target": 6, "now": True})
@@ -247,6 +252,23 @@ def test_slider_answers_at_once_and_leaves_locked_regions_alone(api: Api) -> Non
         back = api.post(f"{path}/undo", status=200)
     assert back["region_count"] == tool["region_count"]
     assert back["segmentation_id"] == tool["segmentation_id"]
+
+
+def test_one_drag_of_the_slider_is_one_step(api: Api) -> None:
+    """While it is dragged, each cut takes the place of the one before; not one that somebody has used, and not the next drag."""
+    tool = imported(api)
+    path = f"/tools/{tool['id']}/segmentations"
+    assert tool["edit"]["slider"] == {"least": 1, "most": 60, "current": tool["region_count"], "now": True}
+    for target in (12, 11, 10):
+        cut = api.post(path, {"target": target, "now": True, "continues": target != 12})
+    assert (cut["region_count"], cut["edit"]["step"], cut["edit"]["slider"]["current"]) == (10, 1, 10)
+    assert [step["region_count"] for step in history(api, tool)] == [tool["region_count"], 10]
+    api.post(f"/tools/{tool['id']}/demonstrations", {"sequence": list(range(10))})
+    used = api.post(path, {"target": 9, "now": True, "continues": True})
+    assert used["edit"]["step"] == 2
+    again = api.post(path, {"target": 8, "now": True})
+    assert again["edit"]["step"] == 3
+    assert api.post(f"{path}/undo", status=200)["region_count"] == 9
 
 
 def test_table_of_regions(api: Api, tool: dict[str, Any]) -> None:

@@ -5,8 +5,7 @@ import { fill, h } from "../dom.js";
 import { icon } from "../icons.js";
 import { plural } from "../words.js";
 
-const RANGE = { least: 1, most: 40 };
-const NO_TREE = 409;
+const PAUSE_MS = 1500; // between arrow keys of one way along the slider
 
 const FIELDS = [
   { key: "tolerance", words: "Fit error allowed", unit: "% of its size", share: 100, usual: 0.1, tip: "How far a region may bend away from a plane, cylinder, cone or sphere" },
@@ -19,12 +18,15 @@ const SWITCHES = [
 
 export class CutPanel {
   // onTool(tool): answered at once or under way.
-  constructor({ onTool }) {
+  constructor({ editor, onTool }) {
+    this.editor = editor;
     this.onTool = onTool;
     this.tool = null;
     this.wanted = null;
     this.sending = false;
-    this.slider = h("input", { type: "range", step: "1", "aria-label": "Number of regions", dataset: { key: "few-many" }, oninput: () => this.slide() });
+    this.made = ""; // the cut this drag made last, which the next one replaces
+    this.keyAt = 0;
+    this.slider = h("input", { type: "range", step: "1", "aria-label": "Number of regions", dataset: { key: "few-many" }, oninput: () => this.slide(), onpointerdown: () => this.begin(), onblur: () => this.begin(), onkeydown: () => this.key() });
     this.value = h("output.num");
     this.presets = h("div.presets");
     this.fault = h("p.error-text", { role: "alert" });
@@ -36,13 +38,15 @@ export class CutPanel {
   show(tool) {
     const other = tool.id !== this.tool?.id;
     this.tool = tool;
-    this.node.hidden = tool.kind === "table";
-    const { least, most } = tool.edit?.slider ?? RANGE;
+    const { least, most } = tool.edit?.slider ?? { least: 1, most: 1 };
+    this.node.hidden = !tool.edit?.slider;
     this.slider.min = String(least);
     this.slider.max = String(Math.max(most, tool.region_count));
     this.slider.disabled = !tool.edit?.editable;
     this.slider.dataset.tip = tool.edit?.why_not ?? "";
     if (other) {
+      this.sending = false;
+      this.wanted = null;
       this.fault.textContent = "";
       this.open(false);
     }
@@ -98,51 +102,69 @@ export class CutPanel {
     this.order(params);
   }
 
-  async order(params) {
-    this.fault.textContent = "";
-    try {
-      this.onTool(await post(this.address, params));
-    } catch (error) {
-      this.fault.textContent = error.message;
-    }
+  order(params) {
+    this.editor.inTurn(async () => {
+      this.fault.textContent = "";
+      try {
+        await this.onTool(await post(this.address, params));
+      } catch (error) {
+        this.fault.textContent = error.message;
+      }
+    });
   }
 
   get address() {
     return `/tools/${encodeURIComponent(this.tool.id)}/segmentations`;
   }
 
+  // Everything from a press of the pointer to the next one, or of arrow keys in a row, is one step of the history.
+  begin() {
+    this.made = "";
+  }
+
+  key() {
+    const now = performance.now();
+    if (now - this.keyAt > PAUSE_MS) this.begin();
+    this.keyAt = now;
+  }
+
   slide() {
     this.wanted = Number(this.slider.value);
     this.told(this.wanted);
-    if (!this.sending) this.send();
+    if (this.sending) return;
+    this.sending = true;
+    this.editor.inTurn(() => this.send());
   }
 
   // Only the latest wish is sent; the answer may be the nearest number the surface allows.
   async send() {
-    this.sending = true;
+    const shown = this.tool.id;
     this.fault.textContent = "";
-    let tool = null;
     try {
-      while (this.wanted !== null) {
-        const target = this.wanted;
-        this.wanted = null;
-        tool = await this.cutInto(target);
-      }
+      while (this.wanted !== null) await this.onTool(await this.cutIntoLatest());
     } catch (error) {
-      this.wanted = null;
       this.fault.textContent = error.message;
     }
+    if (this.tool.id !== shown) return;
+    this.wanted = null;
     this.sending = false;
-    if (tool) this.onTool(tool);
-    else this.say(this.tool.region_count);
+    this.say(this.tool.region_count);
   }
 
-  async cutInto(target) {
-    try {
-      return await post(this.address, { target, now: true });
-    } catch (error) {
-      if (error.status !== NO_TREE || this.wanted !== null) throw error;
-      return post(this.address, { target });
+  async cutIntoLatest() {
+    let tool = this.tool;
+    while (this.wanted !== null) {
+      const target = this.wanted;
+      this.wanted = null;
+      tool = await this.cutInto(target, tool);
     }
+    return tool;
+  }
+
+  async cutInto(target, before) {
+    const now = before.edit.slider.now;
+    const tool = await post(this.address, now ? { target, now, continues: before.segmentation_id === this.made } : { target });
+    this.made = tool.segmentation_id;
+    return tool;
   }
 }

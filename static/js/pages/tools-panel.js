@@ -17,7 +17,7 @@ export class ToolPanel {
     this.table = new RegionTable(editor, { onRenamed: reload });
     this.history = new History(editor);
     this.old = new OldDemonstrations({ onCarried });
-    this.cut = new CutPanel({ onTool: onCut });
+    this.cut = new CutPanel({ editor, onTool: onCut });
     this.tabs = h("div.segmented", { role: "group", "aria-label": "What the panel shows" });
     this.export = h("a.icon-btn.push", { "aria-label": "Download the regions as CSV", dataset: { tip: "Download the regions as CSV", key: "csv" }, download: "" }, icon("download"));
     this.body = h("div.fill", { style: { flex: "1" } });

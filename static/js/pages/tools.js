@@ -34,7 +34,10 @@ const toolbar = new Toolbar(editor);
 const tools = h("div.tool-list");
 const list = h("div.fill", { style: { flex: "1" } }, h("div.scroll", {}, tools), uploadExtras());
 const column = h("nav.card.fill", { "aria-label": "Tools" });
-const panel = new ToolPanel({ editor, list, onChanged: (tool) => replaceTool(tool).catch(complain), onCut: (tool) => replaceTool(tool).then(() => editor.select([])).catch(complain), onCarried: () => load(), reload: () => load().catch(complain) });
+const panel = new ToolPanel({ editor, list, onChanged: (tool) => replaceTool(tool).catch(complain), onCut: async (tool) => {
+  await replaceTool(tool);
+  editor.select([]);
+}, onCarried: () => load(), reload: () => load().catch(complain) });
 const head = h("div.head");
 const cover = h("div.empty", { hidden: true });
 const stage = h("section.stage", { "aria-label": "3D view" }, h("div.tl", {}, toolbar.hint), h("div.bc", {}, toolbar.finish), cover);
