@@ -10,7 +10,7 @@ from app.benches.figures import Figure, Options
 from app.benches.studies import demonstrations
 from app.benches.teaching import SYNTHETIC_TRUTH, Taught, made_up_truths, teach
 from app.errors import InvalidInput
-from app.learning.answering import after_answer, candidates_for, closer, next_pair
+from app.learning.answering import after_answer, candidates_for, next_pair, reply_of
 from app.learning.certified import certify
 from app.learning.certified_state import CertifiedParameters
 from app.learning.evaluation import TRAINED_ON
@@ -116,7 +116,7 @@ def _real(data: Path, quick: bool) -> Iterator[Figure]:
     yield Figure(group, "hits, no answers", sum(o.hit for o in outcomes.values()), f"of {len(outcomes)}", 8, "at least", note)
     yield Figure(group, "Kendall tau, mean, no answers", float(np.mean([o.tau for o in outcomes.values()])), "", 0.92, "at least")
     missed = ", ".join(f"tool {i} {len(draws) - named.count(i)} times" for i in outcomes if named.count(i) < len(draws)) or "none"
-    note = f"mean of {len(draws)} draws, missed: {missed}; an answer says which of two orders is closer"
+    note = f"mean of {len(draws)} draws, missed: {missed}; an answer says which of two orders is right, or closer"
     yield Figure(group, f"hits after {ANSWERS} answers per tool", len(named) / len(draws), f"of {len(outcomes)}", 10, "at least", note)
 
 
@@ -128,7 +128,7 @@ def _named(shown: LearningDemonstration, learned: Generalised, seed: int) -> boo
         pair = next_pair(found)
         if pair is None:
             break
-        found = after_answer(found, pair, closer(found.classes[pair[0]][0], found.classes[pair[1]][0], wanted))
+        found = after_answer(found, pair, reply_of(found.classes[pair[0]][0], found.classes[pair[1]][0], wanted))
     return shown.sequence in found.classes[found.best]
 
 

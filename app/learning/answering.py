@@ -1,9 +1,12 @@
 """What does the expert want on this one tool? A few comparisons of two orders find out, even where the weights can't say it.
 
 The likelihood that was learned (`generalising`) says how probable every order of the tool is. Orders are drawn from it and from
-its uncertainty, those with equal feature sums are one candidate, and each answer "this one is closer to how I would do it" makes
-the candidates it speaks against improbable. What is found may be an exception that no weights on the features express; it is then
-an order for this tool, and changes no weights.
+its uncertainty, those with equal feature sums are one candidate, and each answer makes the candidates it speaks against
+improbable. What is found may be an exception that no weights on the features express; it is then an order for this tool, and
+changes no weights.
+
+An answer says that one of the two is how the expert would do it, which ends the questions, or which of the two is closer to it,
+that both are equally far from it, or nothing. Closer means: fewer pairs of regions come in another order (Kendall).
 """
 
 from collections import Counter
@@ -14,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.learning.generalising import Generalised, on_features
+from app.learning.many_optima import sums_of
 from app.learning.qp import Array
 from app.learning.soft_program import drawn, soft_to_go
 from app.sequencing.classes import equivalent_sequences
@@ -29,7 +33,8 @@ SLIP = 0.02  # probability of an answer against the expert's own order
 DIGITS = 6  # of a feature sum, in its unit, that tell candidates apart
 
 Sequence = tuple[int, ...]
-Reply = Literal["left", "right", "equal", "cant_tell"]
+Reply = Literal["left_mine", "right_mine", "left", "right", "equal", "cant_tell"]
+OUTCOMES: dict[str, int] = {"left": -1, "equal": 0, "right": 1, "left_mine": 2, "right_mine": 3}
 
 
 @dataclass(frozen=True)
@@ -61,19 +66,23 @@ def candidates_for(problem: SequencingProblem, learned: Generalised, generator: 
     root = np.linalg.cholesky(learned.fit.covariance)
     found: Counter[tuple[float, ...]] = Counter()
     shown: dict[tuple[float, ...], Sequence] = {}
+    drawn_weights: list[tuple[Array, float]] = []
     weights, orders = DRAWS
     for _ in range(weights):
         w = (learned.fit.weights + root @ generator.normal(size=len(root))) / BOLDNESS
-        _, chosen = soft_to_go(values, w, problem.n)
-        for row in drawn(chosen, problem.n, generator.random((orders, problem.n))):
-            order = tuple(int(a) for a in row)
-            key = tuple(float(x) for x in np.round(problem.feature_sum(order) * unit, DIGITS) + 0.0)
+        to_go, chosen = soft_to_go(values, w, problem.n)
+        drawn_weights.append((w, float(to_go[0])))
+        rows = drawn(chosen, problem.n, generator.random((orders, problem.n)))
+        for row, total in zip(rows, np.round(sums_of(problem, rows) * unit, DIGITS) + 0.0, strict=True):
+            key = tuple(float(x) for x in total)
             found[key] += 1
-            shown.setdefault(key, order)
-    kept = found.most_common(CANDIDATES)
-    classes = tuple(_members(problem, shown[key]) for key, _ in kept)
-    counts = np.array([count for _, count in kept], np.float64)
-    return Candidates(classes, counts / counts.sum(), _distances(classes))
+            shown.setdefault(key, tuple(int(a) for a in row))
+    totals = np.array([key for key, _ in found.most_common(CANDIDATES)])
+    classes = [_members(problem, shown[tuple(total)]) for total in totals.tolist()]
+    probability = np.mean([np.exp(start - totals @ w) for w, start in drawn_weights], axis=0) * [len(members) for members in classes]
+    ranked = np.argsort(-probability, kind="stable")
+    classes = tuple(classes[k] for k in ranked)
+    return Candidates(classes, probability[ranked] / probability.sum(), _distances(classes))
 
 
 def next_pair(candidates: Candidates) -> tuple[int, int] | None:
@@ -81,32 +90,46 @@ def next_pair(candidates: Candidates) -> tuple[int, int] | None:
     d, p = candidates.distance, candidates.probability
     best, pair = 1e-9, None
     for a in range(len(d) - 1):
-        sides = np.sign(d[a] - d[a + 1 :])  # (rest, C)
-        shares = np.stack([(sides == side) @ p for side in (-1, 0, 1)])
+        others = np.arange(a + 1, len(d))
+        expected = _expected(d, a, others)
+        shares = np.stack([(expected == outcome) @ p for outcome in OUTCOMES.values()])
         worth = -(shares * np.log(np.maximum(shares, 1e-300))).sum(axis=0)
-        for b in np.argsort(-worth, kind="stable"):
-            if (a, a + 1 + int(b)) not in candidates.asked:
-                if worth[b] > best:
-                    best, pair = float(worth[b]), (a, a + 1 + int(b))
+        for k in np.argsort(-worth, kind="stable"):
+            if (a, int(others[k])) not in candidates.asked:
+                if worth[k] > best:
+                    best, pair = float(worth[k]), (a, int(others[k]))
                 break
     return pair
 
 
 def after_answer(candidates: Candidates, pair: tuple[int, int], reply: Reply) -> Candidates:
-    """The candidates once the expert has said which of the pair is closer to what they want."""
+    """The candidates once the expert has compared the pair.
+
+    "left_mine" and "right_mine" are taken at their word; of the others one in `SLIP` may be a mistake.
+    """
     asked = candidates.asked | {pair}
     if reply == "cant_tell":
         return replace(candidates, asked=asked)
-    expected = np.sign(candidates.distance[pair[0]] - candidates.distance[pair[1]])
-    given = {"left": -1, "equal": 0, "right": 1}[reply]
-    weight = candidates.probability * np.where(expected == given, 1 - SLIP, SLIP)
+    expected = _expected(candidates.distance, pair[0], np.array(pair[1:]))[0]
+    mistaken = 0.0 if reply in ("left_mine", "right_mine") else SLIP
+    weight = candidates.probability * np.where(expected == OUTCOMES[reply], 1 - mistaken, mistaken)
     return replace(candidates, probability=weight / weight.sum(), asked=asked)
 
 
-def closer(left: Sequence, right: Sequence, wanted: tuple[Sequence, ...]) -> Reply:
+def reply_of(left: Sequence, right: Sequence, wanted: tuple[Sequence, ...]) -> Reply:
     """How an expert answers to whom any of the wanted orders is as good as another."""
+    if left in wanted or right in wanted:
+        return "left_mine" if left in wanted else "right_mine"
     first, second = (float(_apart(np.array([s]), np.array(wanted)).min()) for s in (left, right))
     return "equal" if first == second else ("left" if first < second else "right")
+
+
+def _expected(distance: Array, a: int, others: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(others, C) what an expert who wants candidate c says to a against each of the others, as in `OUTCOMES`."""
+    outcome = np.sign(distance[a] - distance[others]).astype(np.int64)
+    outcome[:, a] = OUTCOMES["left_mine"]
+    outcome[np.arange(len(others)), others] = OUTCOMES["right_mine"]
+    return outcome
 
 
 def _members(problem: SequencingProblem, order: Sequence) -> tuple[Sequence, ...]:

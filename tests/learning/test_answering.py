@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from app.learning.answering import after_answer, candidates_for, closer, next_pair
+from app.learning.answering import after_answer, candidates_for, next_pair, reply_of
 from app.learning.generalising import Generalised, learn_generalising
 from app.learning.performance_state import LearningDemonstration
 from app.sequencing.comparison import kendall_tau
@@ -36,10 +36,12 @@ def test_an_answer_multiplies_by_its_likelihood(learned: Generalised):
     a, b = pair
     after = after_answer(found, pair, "left")
     near, far = (found.distance[a] < found.distance[b]), (found.distance[a] > found.distance[b])
+    near[a] = far[b] = False  # who wants one of the two says so
     odds = found.probability[near].sum() / found.probability[far].sum()
     assert after.probability[near].sum() / after.probability[far].sum() == pytest.approx(odds * 49)
     assert next_pair(after) != pair
     assert np.array_equal(after_answer(found, pair, "cant_tell").probability, found.probability)
+    assert after_answer(found, pair, "right_mine").probability[b] == 1
 
 
 def test_an_exception_is_found_by_a_few_answers(learned: Generalised):
@@ -50,12 +52,13 @@ def test_an_exception_is_found_by_a_few_answers(learned: Generalised):
     while found.classes[found.best] != wanted or answers == 0:
         pair = next_pair(found)
         assert pair is not None
-        found = after_answer(found, pair, closer(found.classes[pair[0]][0], found.classes[pair[1]][0], wanted))
+        found = after_answer(found, pair, reply_of(found.classes[pair[0]][0], found.classes[pair[1]][0], wanted))
         answers += 1
     assert answers <= 5
 
 
 def test_the_scripted_expert_compares_by_the_nearest_wanted_order():
-    assert closer((0, 1, 2), (2, 1, 0), ((0, 2, 1),)) == "left"
-    assert closer((0, 1, 2), (2, 1, 0), ((2, 0, 1), (1, 2, 0))) == "right"
-    assert closer((0, 1, 2), (0, 1, 2), ((1, 2, 0),)) == "equal"
+    assert reply_of((0, 1, 2), (2, 1, 0), ((0, 2, 1),)) == "left"
+    assert reply_of((0, 1, 2), (2, 1, 0), ((2, 0, 1), (1, 2, 0))) == "right"
+    assert reply_of((0, 1, 2), (0, 1, 2), ((1, 2, 0),)) == "equal"
+    assert reply_of((0, 1, 2), (2, 1, 0), ((2, 1, 0), (1, 2, 0))) == "right_mine"
