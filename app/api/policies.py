@@ -21,6 +21,8 @@ class Weight(Row):
     symbol: str | None = None
     value: float
     identifiable: bool = True
+    share: float | None = None  # of all weights, each in the unit of its feature
+    interval: list[float] | None = None  # where 90 % of the shares lie that agree with what was shown
 
 
 class LearnedFrom(Row):

@@ -141,8 +141,8 @@ def policy_json(session: Session, row: PolicyRow) -> Json:
         "feature_set": row.feature_set,
         "interactions": row.interactions,
         "weights": [
-            {"key": c.key, "label": c.label, "symbol": c.symbol, "value": value, "identifiable": sure}
-            for c, value, sure in zip(_columns(session, row), row.weights, row.identifiable, strict=True)
+            {"key": c.key, "label": c.label, "symbol": c.symbol, "value": value, "identifiable": sure, "share": share, "interval": interval}
+            for c, value, sure, (share, interval) in zip(_columns(session, row), row.weights, row.identifiable, _shares(row), strict=True)
         ],
         "effort_weights": None
         if effort is None
@@ -152,6 +152,15 @@ def policy_json(session: Session, row: PolicyRow) -> Json:
         "learned_from": row.learned_from,
         "created_at": row.created_at,
     }
+
+
+def _shares(row: PolicyRow) -> list[tuple[float | None, list[float] | None]]:
+    """Per weight its share of all and where 90 % of the weights lie that agree with what was shown; nothing where it wasn't measured."""
+    certificate = row.certificate or {}
+    shares, intervals = certificate.get("shares", []), certificate.get("intervals", [])
+    if not len(shares) == len(intervals) == len(row.weights):
+        return [(None, None)] * len(row.weights)
+    return list(zip(shares, intervals, strict=True))
 
 
 def plan_json(ctx: Context, session: Session, row: Plan) -> Json:

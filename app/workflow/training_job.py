@@ -94,6 +94,8 @@ def finish(values: Values, session: Session, job: JobRow, out: Outcome) -> None:
         return _settle(session, row, out)
     for iteration, loss, terms, violations in out.metrics:
         session.merge(Metric(run_id=row.id, iteration=iteration, loss=loss, terms=terms, violations=violations))
+    if out.interactions is not None:
+        row.interactions = [{"first": i.first, "second": i.second} for i in out.interactions]
     row.iteration = out.iteration
     row.checkpoint += 1
     if out.questions:
@@ -128,8 +130,10 @@ def _answers(session: Session, run_id: str) -> dict[str, str]:
 
 
 def _checkpoint(session: Session, row: Run, out: Outcome) -> RunCheckpoint:
+    before = session.get(RunCheckpoint, (row.id, row.checkpoint - 1))
+    kept = {"interactions": before.report["interactions"]} if before and before.report and "interactions" in before.report else {}
     return RunCheckpoint(
-        report=None if out.report is None else _named(session, row, out.report),
+        report=None if out.report is None else {**kept, **_named(session, row, out.report)},
         run_id=row.id,
         number=row.checkpoint,
         round=row.round,
@@ -188,21 +192,19 @@ def _new_query(values: Values, session: Session, row: Run, shown: list[Demonstra
 def _named(session: Session, row: Run, report: Json) -> Json:
     """A certificate with the tools it speaks of: demonstrated ones beside their slack, the others with their chances."""
     shown = demonstrations_of(session, row.id)
-    cuts = [found(session, Segmentation, key, "segmentation") for key in row.interest]
 
-    def name(tool_id: str, shown: Demonstration | None = None) -> Json:
-        called = found(session, ToolRow, tool_id, "tool").name if shown is None else _order_name(session, row, shown)
-        return {"tool_id": tool_id, "tool_name": called}
+    def name(shown: Demonstration) -> Json:
+        return {"tool_id": shown.tool_id, "tool_name": _order_name(session, row, shown), "sequence": list(shown.sequence)}
 
     ties = report["class_sizes"] or [None] * len(shown)
     demonstrated = [
-        {**name(d.tool_id, d), "slack": slack, "ties": size}
+        {**name(d), "slack": slack, "ties": size}
         for d, slack, size in zip(shown, report["slack"] or [0.0] * len(shown), ties, strict=True)
     ]
-    tools = [{**name(cuts[t["tool"]].tool_id), **{k: v for k, v in t.items() if k != "tool"}} for t in report["tools"]]
+    tools = _named_tools(session, row, report["tools"])
     conflicts = [
         {
-            "tools": [{**name(shown[i].tool_id, shown[i]), "slack": x} for i, x in zip(c["members"], c["slack"], strict=True)],
+            "tools": [{**name(shown[i]), "slack": x} for i, x in zip(c["members"], c["slack"], strict=True)],
             "resolved": c["resolved"],
         }
         for c in report["conflicts"]
@@ -214,6 +216,16 @@ def _named(session: Session, row: Run, report: Json) -> Json:
         "tools": tools,
         "conflicts": conflicts,
     }
+
+
+def _named_tools(session: Session, row: Run, tools: list[Json]) -> list[Json]:
+    """How sure the choice is on each tool of interest, with its name."""
+    named = []
+    for entry in tools:
+        tool_id = found(session, Segmentation, row.interest[entry["tool"]], "segmentation").tool_id
+        name = found(session, ToolRow, tool_id, "tool").name
+        named.append({"tool_id": tool_id, "tool_name": name, **{k: v for k, v in entry.items() if k != "tool"}})
+    return named
 
 
 def _close(session: Session, row: Run, out: Outcome) -> None:
@@ -233,7 +245,10 @@ def _close(session: Session, row: Run, out: Outcome) -> None:
 def _settle(session: Session, row: Run, out: Outcome) -> None:
     """The policy of orders that contradict each other: on the features that predict them best, without interactions."""
     policy = write_policy(session, row, list(out.weights), list(out.identifiable), converged=False)
-    policy.feature_set, policy.interactions, policy.certificate = out.features or policy.feature_set, [], out.report
+    before, report = checkpoint_of(session, row), out.report or {}
+    kept = {key: before.report[key] for key in ("conflicts", "interactions") if key in before.report} if before and before.report else {}
+    policy.feature_set, policy.interactions = out.features or policy.feature_set, []
+    policy.certificate = {**kept, **report, "tools": _named_tools(session, row, report.get("tools", []))}
     session.add(policy)
     go(session, row, "converged", out.message)
 

@@ -1,6 +1,6 @@
 """One step of a learner, away from the database: what it needs, what it gives, and how it is computed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +9,7 @@ from app.jobs.worker import Report
 from app.learning.certified_run import Memory, certified_step, start_certified
 from app.learning.certified_state import CertifiedParameters, CertifiedState
 from app.learning.effort import EffortParameters, EffortState, effort_step, start_effort
-from app.learning.generalising import Generalised, exceptions_predict_better, learn_generalising
+from app.learning.generalising import Generalised, exceptions_predict_better, learn_generalising, on_features
 from app.learning.performance import (
     LearningDemonstration,
     PerformanceParameters,
@@ -20,7 +20,10 @@ from app.learning.performance import (
 from app.learning.performance_conflict import Contradiction
 from app.learning.performance_state import Metric
 from app.learning.qp import Array
-from app.sequencing.problem import SequencingProblem
+from app.learning.selecting import Selection, select_interactions
+from app.learning.sureness import sureness
+from app.sequencing.features import FEATURE_SETS, Interaction
+from app.sequencing.problem import TENSOR_LIMIT, SequencingProblem
 from app.workflow.values import Kept
 
 Json = dict[str, Any]
@@ -84,21 +87,20 @@ class Outcome:
     contradiction: Contradiction | None = None
     report: Json | None = None  # certified: with indices for tools and demonstrations
     features: str | None = None  # likelihood: name of the feature set it chose
+    interactions: tuple[Interaction, ...] | None = None  # first step of a certified run: those that count from here on
 
 
 def compute(step: Step, report: Report) -> Outcome:
     """One step of the learner; pure."""
     report(0.05, "Comparing orders")
     known = [LearningDemonstration(_known(key, d.problem), d.sequence) for key, d in zip(step.keys, step.demonstrations, strict=True)]
+    tools = [_known(key, tool) for key, tool in zip(step.tool_keys, step.tools, strict=True)]
     if step.kind == LIKELIHOOD:
-        return _likelihood(learn_generalising(known), len(known), CONTRADICT)
+        return _likelihood(learn_generalising(known), known, tools, CONTRADICT)
     if isinstance(step.parameters, CertifiedParameters) and step.state is None:
-        exceptions = exceptions_predict_better(known, step.seed)
-        if exceptions is not None:
-            words = AGREE.format(exceptions.certified_hits, len(known))
-            return _likelihood(exceptions.generalised, len(known), words)
+        return _begin(step, step.parameters, known, tools, report)
     if isinstance(step.parameters, CertifiedParameters):
-        return _certified(step, step.parameters, known)
+        return _certified(step, step.parameters, known, tools)
     if isinstance(step.parameters, EffortParameters):
         return _effort(step, step.parameters, known)
     return _performance(step, step.parameters, known)
@@ -108,8 +110,29 @@ def _known(key: tuple[Any, ...], problem: SequencingProblem) -> SequencingProble
     return _problems.get(key, lambda: problem)
 
 
-def _certified(step: Step, parameters: CertifiedParameters, demonstrations: list[LearningDemonstration]) -> Outcome:
-    tools = [_known(key, tool) for key, tool in zip(step.tool_keys, step.tools, strict=True)]
+def _begin(
+    step: Step, parameters: CertifiedParameters, known: list[LearningDemonstration], tools: list[SequencingProblem], report: Report
+) -> Outcome:
+    """The first step of a certified run: which suspected interactions count, whether exceptions are allowed for, what is open."""
+    chosen = select_interactions(
+        known, known[0].problem.interactions, step.seed, lambda share, words: report(round(0.05 + 0.6 * share, 2), words)
+    )
+    demonstrations = [replace(d, problem=_counting(d.problem, chosen)) for d in known]
+    exceptions = exceptions_predict_better(demonstrations, step.seed)
+    if exceptions is not None:
+        return _likelihood(exceptions.generalised, known, tools, AGREE.format(exceptions.certified_hits, len(known)))
+    out = _certified(step, parameters, demonstrations, [_counting(t, chosen) for t in tools])
+    return replace(out, interactions=chosen.kept, report={**(out.report or {}), "interactions": chosen.to_json(known[0])})
+
+
+def _counting(problem: SequencingProblem, chosen: Selection) -> SequencingProblem:
+    """The same tool with the interactions that count; the very same problem where they all do."""
+    return problem if problem.interactions == chosen.kept else replace(problem, interactions=chosen.kept)
+
+
+def _certified(
+    step: Step, parameters: CertifiedParameters, demonstrations: list[LearningDemonstration], tools: list[SequencingProblem]
+) -> Outcome:
     state = CertifiedState.from_json(step.state) if step.state else start_certified(demonstrations, tools, parameters, step.seed)
     memory: Memory = _memories.get((step.run_id, step.seed, parameters), Memory.empty)
     result = certified_step(demonstrations, tools, parameters, state, step.answers, memory, step.gone)
@@ -127,10 +150,19 @@ def _certified(step: Step, parameters: CertifiedParameters, demonstrations: list
     )
 
 
-def _likelihood(found: Generalised, count: int, why: str) -> Outcome:
-    """The policy that allows for exceptions, and how well it predicts each of `count` demonstrations left out in turn."""
-    chosen, policy = found.chosen, found.policy
+def _likelihood(found: Generalised, demonstrations: list[LearningDemonstration], tools: list[SequencingProblem], why: str) -> Outcome:
+    """The policy that allows for exceptions, how well it predicts each demonstration left out in turn, and how sure it is of the rest."""
+    chosen, policy, count = found.chosen, found.policy, len(demonstrations)
+    own = demonstrations[0].problem.features
+    features = own if policy.features == own.name else FEATURE_SETS[policy.features]
+    fit = [on_features(t, features) for t in tools if t.n <= TENSOR_LIMIT]
+    sure = sureness(found, fit, CertifiedParameters().tolerance)
+    places = [t for t, problem in enumerate(tools) if problem.n <= TENSOR_LIMIT]
     report = {
+        "shares": list(sure.shares),
+        "intervals": [list(x) for x in sure.intervals],
+        "tools": [{**vars(c), "tool": places[c.tool]} for c in sure.tools],
+        "expected_wrong": sum(1 - c.probability for c in sure.tools),
         "kind": LIKELIHOOD,
         "held_out_hits": chosen.hits,
         "of": count,
@@ -139,8 +171,8 @@ def _likelihood(found: Generalised, count: int, why: str) -> Outcome:
         "penalty": chosen.penalty,
     }
     words = f"{why} {chosen.hits} of {count} are predicted from the others (mean agreement {chosen.tau:.2f})."
-    weights, sure = _floats(policy.weights), tuple(bool(x) for x in policy.identifiable)
-    return Outcome({}, "compromise", 0, (), (), weights, sure, words, None, report, policy.features)
+    weights, decided = _floats(policy.weights), tuple(bool(x) for x in policy.identifiable)
+    return Outcome({}, "compromise", 0, (), (), weights, decided, words, None, report, policy.features)
 
 
 def _performance(step: Step, parameters: PerformanceParameters, demonstrations: list[LearningDemonstration]) -> Outcome:

@@ -48,7 +48,7 @@ function paintHead() {
   fill(parts.head, h("div.title", {}, h("h1", {}, "What the demonstrations show so far"),
     h("p", {}, `${sentence(spoken(demonstrations, "demonstration"))}, ${plural(steps, "step")}. A policy can only be trusted where it has seen examples.`)),
   first
-    ? h("div.next", {}, h("p", {}, h("span.kicker", {}, `Next: record ${first.tool_name}`), first.gain > 0 ? `can lift coverage by ${first.gain.toFixed(2)}, ${signed(first.expected)} on average` : "it shows a new situation"), h("a.btn.primary", { href: pageAddress(shell.projectId, "record", { tool: first.tool_id }) }, "Record it"))
+    ? h("div.next", {}, h("p", {}, h("span.kicker", {}, `Next: record ${first.tool_name}`), first.gain > 0 ? `${signed(first.expected)} on average, ${signed(first.gain)} at best` : "it shows a new situation"), h("a.btn.primary", { href: pageAddress(shell.projectId, "record", { tool: first.tool_id }) }, "Record it"))
     : h("div.next", {}, h("p", {}, h("span.kicker", {}, "Next: teach"), "no tool here would add a situation"), h("a.btn.primary", { href: pageAddress(shell.projectId, "teach") }, "Go on to teach")));
 }
 

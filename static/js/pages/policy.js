@@ -12,6 +12,7 @@ import { complain } from "../toasts.js";
 import { View3D } from "../view3d.js";
 import { Wishes } from "../wishes.js";
 import { number, plural } from "../words.js";
+import { Certificate } from "./policy-certificate.js";
 
 const CAUSES = 5; // named in the chart; the rest is one grey bar
 
@@ -25,10 +26,11 @@ const parts = {
   legend: h("div.legend"),
   chart: h("div.chart"),
   tiles: h("div.tiles", { role: "group", "aria-label": "Order; move a region with Alt and the arrows to see what it would cost" }),
-  weights: h("dialog.card.pad.keys.weights"),
 };
 const wishes = new Wishes({ onChange: plan });
-const state = { policies: [], policy: null, tools: [], tool: null, plan: null, order: [], whatif: null, view: null, stepper: null, chart: null };
+const names = new Map();
+const certificate = new Certificate({ projectId: shell.projectId, names, onCompare: (tool, sequence) => compare(tool, sequence).catch(complain) });
+const state = { policies: [], policy: null, tools: [], tool: null, plan: null, order: [], recorded: false, whatif: null, view: null, stepper: null, chart: null };
 
 // ---- chart --------------------------------------------------------------------------------------------------------------------
 
@@ -63,10 +65,25 @@ async function move(from, to) {
   if (to < 0 || to >= state.order.length || from === to) return;
   const order = [...state.order];
   order.splice(to, 0, ...order.splice(from, 1));
+  state.recorded = false;
+  await tryOrder(order, () => parts.tiles.children[to]?.focus());
+}
+
+// A recorded order beside the cheapest one: in 3D, and through which features it costs more.
+async function compare(toolId, sequence) {
+  const tool = state.tools.find((entry) => entry.id === toolId);
+  if (!tool) throw new Error("This tool is no longer in the project.");
+  await open(tool);
+  if ([...sequence].sort().join() !== [...state.plan.sequence].sort().join()) throw new Error(`${tool.name} was cut into other regions since, or its plan leaves some out, so the two orders can't be compared.`);
+  state.recorded = true;
+  await tryOrder([...sequence]);
+}
+
+async function tryOrder(order, shown = () => {}) {
   state.order = order;
   state.whatif = null;
   paintOrder();
-  parts.tiles.children[to]?.focus();
+  shown();
   if (changed()) {
     const answer = await post(`/plans/${state.plan.id}/what-if`, { sequence: order });
     if (state.order === order) state.whatif = answer;
@@ -75,18 +92,20 @@ async function move(from, to) {
 }
 
 function paintWhatIf() {
-  if (!changed()) return fill(parts.whatif, h("h3", {}, "What if?"), h("p.muted", {}, "Move a region below to another place and see what it would cost."));
-  if (!state.whatif) return fill(parts.whatif, h("h3", {}, "Your change"), skeleton(2, ".9rem"));
+  const title = state.recorded ? "Your recorded order" : "Your change";
+  if (!changed()) return fill(parts.whatif, h("h3", {}, state.recorded ? title : "What if?"), h("p.muted", {}, state.recorded ? "It is the order of the policy. Move a region to see what that would cost." : "Move a region below to another place and see what it would cost."));
+  if (!state.whatif) return fill(parts.whatif, h("h3", {}, title), skeleton(2, ".9rem"));
   const { delta, features } = state.whatif;
   const signed = (value) => `${value < 0 ? "−" : "+"}${number(Math.abs(value))}`;
   const most = [...features].filter((entry) => Math.abs(entry.delta) > 1e-9).sort((a, b) => Math.abs(b.delta) - Math.abs(a.delta)).slice(0, 3);
   const verdict = Math.abs(delta) <= 1e-7 * Math.max(1, Math.abs(state.plan.cost)) ? "equally cheap" : signed(delta);
-  return fill(parts.whatif, h("h3", {}, "Your change", h("span.num", {}, verdict)),
+  return fill(parts.whatif, h("h3", {}, title, h("span.num", {}, verdict)),
     h("div.pay", {}, most.map((entry) => [h("span.swatch", { style: { "--swatch": entry.delta > 0 ? "var(--bad)" : "var(--ok)" } }), h("span", {}, entry.label), h("span.num", {}, signed(entry.delta))])),
     h("button.btn.small", { type: "button", style: { "margin-top": "var(--s-2)" }, onclick: back }, "Back to the cheapest order"));
 }
 
 function back() {
+  state.recorded = false;
   state.order = [...state.plan.sequence];
   state.whatif = null;
   paintOrder();
@@ -133,7 +152,7 @@ function paintHead() {
   const { tool, plan, policy } = state;
   const learned = `Learned from ${plural(policy.learned_from.demonstrations, "demonstration")} and ${plural(policy.learned_from.answers, "answer")}.`;
   fill(parts.head, h("div.title", {}, h("h1", {}, `The order for ${tool.name}`), h("p", {}, `${plan.demonstrated ? "You have demonstrated this tool." : "Nobody has demonstrated this tool."} ${learned}`)),
-    h("button.btn.quiet", { type: "button", style: { "margin-left": "auto" }, dataset: { key: "weights" }, onclick: showWeights }, icon("table"), "What it learned"),
+    h("button.btn.quiet", { type: "button", style: { "margin-left": "auto" }, dataset: { key: "weights" }, onclick: () => certificate.open() }, icon("table"), "What it learned"),
     h("button.btn.quiet", { type: "button", dataset: { key: "export", tip: "The order, its cost and its explanation as JSON" }, onclick: save }, icon("download"), "Export"),
     h("div.next", { style: { "margin-left": "0" } }, h("p", {}, h("span.kicker", {}, "Next: watch the robot"), "in simulation"), h("a.btn.primary", { href: pageAddress(shell.projectId, "robot", { plan: plan.id }) }, "Open on the robot")));
 }
@@ -143,23 +162,12 @@ function paintProof() {
   parts.proof.dataset.proved = String(plan.proved);
   fill(parts.proof, icon(plan.proved ? "shield" : "warn"), h("div", {}, h("b", {}, plan.sureness),
     h("span.small.muted", { dataset: plan.proved ? {} : { tip: plan.method } }, plan.proved ? `Cheapest of all ${plan.constraints ? "orders that keep what you asked" : `${plan.orders} orders`}, in ${number(plan.milliseconds, 2)} ms` : `${plural(plan.sequence.length, "region")} are too many to look at every order${plan.bound === null ? "" : `; none costs less than ${number(plan.bound)}`}.`)));
+  certificate.show(state.policy, state.tool);
   const fact = (term, value, tip = null) => h("div.fact", { dataset: tip ? { tip } : {} }, h("dt", {}, term), h("dd", {}, value));
   fill(parts.facts, fact("Cost", number(plan.cost), "C = w · Φ, added along the order; low is good"),
     fact("Equally cheap", plan.ties === 1 ? "this one only" : `${Number(plan.ties).toLocaleString("en")} orders`, "Orders in the lowest cost class (relative 1e-7)"),
     fact("Effort", plan.effort === null ? "not taught yet" : number(plan.effort), "eta, Eq. 8: breaks ties among equally cheap orders"),
     fact("Tie settled by", plan.tie_settled_by ?? (plan.ties === 1 ? "no tie" : "lowest letters")));
-}
-
-function showWeights() {
-  const { policy } = state;
-  const most = Math.max(1e-12, ...policy.weights.map((weight) => Math.abs(weight.value)));
-  const row = (weight) => h(`tr${weight.identifiable ? "" : ".open"}`, { dataset: weight.identifiable ? {} : { tip: "The demonstrations do not decide this weight: it can be anything without changing which order is cheapest." } },
-    h("td", {}, h("span", { dataset: { tip: weight.symbol } }, weight.label)), h("td.num", {}, number(weight.value)), h("td", { style: { width: "8rem" } }, h("div.progress", {}, h("i", { style: { width: `${(100 * Math.abs(weight.value)) / most}%` } }))), h("td.small", {}, weight.identifiable ? "" : "not decided"));
-  fill(parts.weights, h("h2", {}, "What the policy has learned"), h("p.small.muted", {}, `${policy.name}. A larger weight makes it dearer; feature set ${policy.feature_set}.`),
-    h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, "What costs"), h("th.num", {}, "Weight"), h("th", {}, ""), h("th", {}, ""))), h("tbody", {}, policy.weights.map(row))),
-    policy.effort_weights ? [h("h3", { style: { "margin-top": "var(--s-4)" } }, "Effort"), h("table", {}, h("tbody", {}, policy.effort_weights.map((weight) => h("tr", {}, h("td", {}, weight.label), h("td.num", {}, number(weight.value))))))] : null,
-    h("form", { method: "dialog" }, h("button.btn", {}, "Close")));
-  parts.weights.showModal();
 }
 
 function save() {
@@ -176,6 +184,7 @@ function drawCrumb() {
 
 async function open(tool) {
   state.tool = tool;
+  state.recorded = false;
   remember("tool", tool.id);
   const [regions, asked] = await Promise.all([all(`/tools/${tool.id}/regions`), lastAsked(tool)]);
   const names = [];
@@ -211,6 +220,7 @@ async function load() {
   state.policies = await all(`/projects/${shell.projectId}/policies`);
   state.policy = state.policies.reduce((latest, policy) => (!latest || policy.created_at > latest.created_at ? policy : latest), null);
   state.tools = (await all(`/projects/${shell.projectId}/tools`)).filter((tool) => tool.state === "ready");
+  for (const tool of state.tools) names.set(tool.id, tool.name);
 }
 
 function showEmpty() {
@@ -226,8 +236,8 @@ async function start() {
   state.stepper = new Stepper({ n: 1, onStep: showOrder, name: "Play the order" });
   parts.stage.append(h("div.bl", {}, h("div.play", {}, state.stepper.node)));
   state.stepper.node.style.flex = "1";
-  fill(shell.main, parts.head, h("div.policy-upper", {}, parts.stage, h("aside.card.fill", {}, parts.proof, parts.facts, wishes.node, parts.whatif)),
-    h("section.card.policy-lower", { "aria-label": "Why this order" }, h("div.bar-head", {}, h("h2.nowrap", {}, "Why this order"), h("span.small.muted.nowrap", {}, "cost per step"), parts.legend), parts.chart, parts.tiles, h("p.underline", {}, "Drag a region to another place, or use Alt with the arrows.")), parts.weights);
+  fill(shell.main, parts.head, h("div.policy-upper", {}, parts.stage, h("aside.card.fill", {}, parts.proof, certificate.line, parts.facts, wishes.node, parts.whatif)),
+    h("section.card.policy-lower", { "aria-label": "Why this order" }, h("div.bar-head", {}, h("h2.nowrap", {}, "Why this order"), h("span.small.muted.nowrap", {}, "cost per step"), parts.legend), parts.chart, parts.tiles, h("p.underline", {}, "Drag a region to another place, or use Alt with the arrows.")), certificate.node);
   state.view = new View3D(parts.stage, { projectId: shell.projectId, name: "policy" });
   state.view.onPicked((region) => wishes.pick(region));
   movable();
