@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.geometry.fitting import CYLINDER, KINDS, NORMAL_WEIGHT, SIZE, SPHERE, face_sums, fit
+from app.geometry.compiled import kernel
+from app.geometry.fitting import CYLINDER, KINDS, NORMAL_WEIGHT, SIZE, SPHERE, fit, sums_about
 from app.geometry.tool import Array, Mesh
 
 # RMS cost of a primitive / size of the region above which it is called free-form: facets of true primitives stay under
@@ -32,28 +33,38 @@ class Attributes:
 def find_attributes(mesh: Mesh, labels: NDArray[np.int32]) -> Attributes:
     """Measure every region."""
     n = int(labels.max()) + 1
-    corners = mesh.vertices[mesh.faces]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
-    face_area = np.linalg.norm(cross, axis=1)
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+    cross = np.cross(b - a, c - a) / 2
+    face_area = np.sqrt(np.einsum("ij,ij->i", cross, cross))
     inside = labels >= 0
 
     def total(values: Array) -> Array:
         return np.bincount(labels[inside], weights=values[inside], minlength=n).astype(float, copy=False)
 
     area = total(face_area)
-    centres = corners.mean(axis=1)
+    centres = (a + b + c) / 3
     centroid = np.stack([total(face_area * centres[:, k]) for k in range(3)], axis=1) / area[:, None]
     normal = np.stack([total(cross[:, k]) for k in range(3)], axis=1)
     size = np.linalg.norm(normal, axis=1)
     # a region that closes on itself (a ring wall) has no mean normal; call it upright
     normal = np.where((size > 1e-6 * area)[:, None], normal / np.maximum(size, 1e-300)[:, None], [0.0, 0.0, 1.0])
-    low, high = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)
-    for k in range(3):
-        np.minimum.at(low, labels[inside], corners[inside, k])
-        np.maximum.at(high, labels[inside], corners[inside, k])
+    low, high = region_boxes(mesh.vertices, mesh.faces, labels, n)
     bends = [region_shape(mesh, np.flatnonzero(labels == a)) for a in range(n)]
     curvature, kind = np.array([b for b, _ in bends]), tuple(k for _, k in bends)
     return Attributes(area, total(np.abs(cross[:, 2])), centroid, normal, curvature, kind, low, high)
+
+
+@kernel
+def region_boxes(vertices, faces, labels, n):  # pragma: no cover - compiled
+    """Lower and upper corner (n, 3) of the box of each region; faces with label -1 belong to none."""
+    low, high = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)
+    for f in range(len(faces)):
+        if labels[f] >= 0:
+            for v in faces[f]:
+                for c in range(3):
+                    low[labels[f], c] = min(low[labels[f], c], vertices[v, c])
+                    high[labels[f], c] = max(high[labels[f], c], vertices[v, c])
+    return low, high
 
 
 def region_shape(mesh: Mesh, faces: NDArray[np.int64]) -> tuple[float, str]:
@@ -61,11 +72,10 @@ def region_shape(mesh: Mesh, faces: NDArray[np.int64]) -> tuple[float, str]:
 
     Paper: curvature comes from the fitted primitive, 1/r; where none fits, from how the normals turn over the region.
     """
-    corners = mesh.vertices[mesh.faces[faces]]
-    middle = (corners.min(axis=(0, 1)) + corners.max(axis=(0, 1))) / 2
-    scale = float(np.linalg.norm(np.ptp(corners.reshape(-1, 3), axis=0)))
-    used, compact = np.unique(mesh.faces[faces], return_inverse=True)
-    sums = face_sums((mesh.vertices[used] - middle) / scale, compact.reshape(-1, 3)).sum(axis=0)
+    chosen = mesh.faces[faces]
+    low, high = (box[0] for box in region_boxes(mesh.vertices, chosen, np.zeros(len(chosen), np.int32), 1))
+    scale = float(np.linalg.norm(high - low))
+    sums = sums_about(mesh.vertices, chosen, (low + high) / 2, scale)
     out = np.empty(5)
     cost = float(fit(sums, NORMAL_WEIGHT, out))
     kind = int(out[0])
@@ -73,7 +83,7 @@ def region_shape(mesh: Mesh, faces: NDArray[np.int64]) -> tuple[float, str]:
         if kind in (SPHERE, CYLINDER) and abs(out[1]) < FLAT_TURN:
             return 0.0, "plane"
         return float(out[1]) / scale, KINDS[kind]
-    bend = turning_curvature(corners)
+    bend = turning_curvature(mesh.vertices[chosen])
     return (bend if abs(bend) * scale > NO_TURN else 0.0), "freeform"
 
 

@@ -38,8 +38,8 @@ class RegionMap:
 def map_regions(old: Tool, new: Tool) -> RegionMap:
     """Compare two cuts of one part."""
     shared = np.zeros((old.n + 1, new.n + 1))
-    source, weight = locate(old.mesh, new.mesh)
-    area = areas(old.mesh.vertices, old.mesh.faces.astype(np.int64))[:, None] * weight
+    source = locate(old.mesh, new.mesh)
+    area = np.repeat(areas(old.mesh.vertices, old.mesh.faces)[:, None] / len(PROBES), len(PROBES), axis=1)
     known = source >= 0
     np.add.at(shared, (np.repeat(old.labels, source.shape[1])[known.ravel()], new.labels[source[known]]), area[known])
     new_of = np.full(old.n, NONE, np.int64)
@@ -50,34 +50,42 @@ def map_regions(old: Tool, new: Tool) -> RegionMap:
     return RegionMap(new_of, shared)
 
 
-def locate(here: Mesh, there: Mesh) -> tuple[Integers, Array]:
-    """For points inside every face of one mesh, the face of the other they lie in (F, 4), and the weight of each point (F, 4).
+def locate(here: Mesh, there: Mesh, probes: Array = PROBES) -> Integers:
+    """For points inside every face of one mesh, the face of the other they lie in (F, number of points).
 
-    Equal faces have it four times.
+    Equal faces have it each time. The points are given by barycentric weights (K, 3); the first of PROBES is the middle.
     """
     size = float(np.linalg.norm(np.ptp(there.vertices, axis=0)))
     mine, theirs = _keys(here, there, size)
     order = np.argsort(theirs)
     at = np.minimum(np.searchsorted(theirs, mine, sorter=order), len(theirs) - 1)
     face = np.where(theirs[order][at] == mine, order[at], NONE)
-    source = np.repeat(face[:, None], len(PROBES), axis=1)
+    source = np.repeat(face[:, None], len(probes), axis=1)
     open_here = np.flatnonzero(face == NONE)
     if len(open_here):
-        left = np.setdiff1d(np.arange(len(there.faces)), face)
-        points = np.einsum("pc,fci->fpi", PROBES, here.vertices[here.faces[open_here]]).reshape(-1, 3)
-        candidates = left if len(left) else np.arange(len(there.faces))
-        source[open_here] = _nearest(there, candidates, points).reshape(-1, len(PROBES))
-    return source, np.full(source.shape, 1 / len(PROBES))
+        alone = np.ones(len(there.faces), bool)
+        alone[face[face != NONE]] = False
+        points = np.einsum("pc,fci->fpi", probes, here.vertices[here.faces[open_here]]).reshape(-1, 3)
+        candidates = np.flatnonzero(alone) if alone.any() else np.arange(len(there.faces))
+        source[open_here] = _nearest(there, candidates, points).reshape(-1, len(probes))
+    return source
 
 
 def _keys(here: Mesh, there: Mesh, size: float) -> tuple[Integers, Integers]:
     """Equal numbers for equal triangles of the two meshes."""
-    corners = np.concatenate([np.rint(m.vertices[m.faces] / (GRID * size)).astype(np.int64) for m in (here, there)])
-    _, number = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
-    triple = np.sort(number.reshape(-1, 3), axis=1)
-    _, key = np.unique(triple, axis=0, return_inverse=True)
-    key = key.ravel().astype(np.int64)
+    place = _row_numbers(np.rint(np.concatenate([here.vertices, there.vertices]) / (GRID * size)).astype(np.int64))
+    corners = np.concatenate([place[here.faces], place[len(here.vertices) + there.faces.astype(np.int64)]])
+    key = _row_numbers(np.sort(corners, axis=1))
     return key[: len(here.faces)], key[len(here.faces) :]
+
+
+def _row_numbers(rows: Integers) -> Integers:
+    """A number for each row (K,), the same for equal rows."""
+    number = np.zeros(len(rows), np.int64)
+    for column in rows.T:
+        own = column - column.min()
+        number = np.unique(number * (own.max() + 1) + own, return_inverse=True)[1].ravel().astype(np.int64)
+    return number
 
 
 def _nearest(mesh: Mesh, faces: Integers, points: Array) -> Integers:

@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from app.errors import UnreadableMesh
+from app.geometry.compiled import kernel
 from app.geometry.tool import Array
 
 Level = Literal["info", "repaired", "refused", "warning"]
@@ -116,19 +117,55 @@ def _drop_useless(vertices: Array, faces: Integers, cad_face: Integers) -> tuple
 
 def edge_table(faces: NDArray[np.integer]) -> tuple[Integers, Integers, Integers]:
     """Edges (E, 2) sorted, the edge of each face side (F, 3), and the number of faces at each edge (E,)."""
-    sides = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2).astype(np.int64), axis=1)
-    n = int(faces.max()) + 1
-    key, inverse, count = np.unique(sides[:, 0] * n + sides[:, 1], return_inverse=True, return_counts=True)
-    return np.stack([key // n, key % n], axis=1), inverse.reshape(-1, 3), count
+    compact = np.ascontiguousarray(faces, np.int64)
+    return _edges_of(compact, int(compact.max(initial=-1)) + 1)
+
+
+@kernel
+def _edges_of(faces, n):  # pragma: no cover - compiled
+    """Sides are put into one bucket per smaller vertex; within a bucket, which holds about three, they are sorted by the other one."""
+    total = 3 * len(faces)
+    start, other, side = np.zeros(n + 1, np.int64), np.empty(total, np.int64), np.empty(total, np.int64)
+    for f in range(len(faces)):
+        for k in range(3):
+            start[min(faces[f, k], faces[f, (k + 1) % 3]) + 1] += 1
+    start = np.cumsum(start)
+    free = start[:-1].copy()
+    for f in range(len(faces)):
+        for k in range(3):
+            low, high = min(faces[f, k], faces[f, (k + 1) % 3]), max(faces[f, k], faces[f, (k + 1) % 3])
+            other[free[low]], side[free[low]] = high, 3 * f + k
+            free[low] += 1
+    edges, side_edge, count = np.empty((total, 2), np.int64), np.empty((len(faces), 3), np.int64), np.zeros(total, np.int64)
+    edge = -1
+    for low in range(n):
+        first, last = start[low], start[low + 1]
+        order = np.argsort(other[first:last], kind="mergesort")
+        for at in range(last - first):
+            here = first + order[at]
+            if at == 0 or other[here] != edges[edge, 1]:
+                edge += 1
+                edges[edge, 0], edges[edge, 1] = low, other[here]
+            side_edge[side[here] // 3, side[here] % 3] = edge
+            count[edge] += 1
+    return edges[: edge + 1], side_edge, count[: edge + 1]
 
 
 def face_pairs(faces: NDArray[np.integer]) -> Integers:
     """Pairs of faces (P, 2) that share an edge with exactly two faces."""
     _, side_edge, count = edge_table(faces)
-    flat = side_edge.ravel()
-    order = np.argsort(flat, kind="stable")
-    order = order[count[flat[order]] == 2]
-    return (order // 3).reshape(-1, 2)
+    return _pairs_at(side_edge, count)
+
+
+@kernel
+def _pairs_at(side_edge, count):  # pragma: no cover - compiled
+    pairs = np.full((len(count), 2), -1, np.int64)
+    for f in range(len(side_edge)):
+        for k in range(3):
+            edge = side_edge[f, k]
+            if count[edge] == 2:
+                pairs[edge, 1 if pairs[edge, 0] >= 0 else 0] = f
+    return pairs[count == 2]
 
 
 def components(faces: Integers) -> Integers:
@@ -143,8 +180,9 @@ def components(faces: Integers) -> Integers:
 
 def areas(vertices: Array, faces: NDArray[np.integer]) -> Array:
     """Area of each face (F,)."""
-    corners = vertices[faces]
-    return np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    (x, y, z), (u, v, w) = (b - a).T, (c - a).T
+    return np.sqrt((y * w - z * v) ** 2 + (z * u - x * w) ** 2 + (x * v - y * u) ** 2) / 2
 
 
 def _turn(faces: Integers, flip: NDArray[np.bool_] | None) -> tuple[Integers, int]:

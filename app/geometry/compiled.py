@@ -26,10 +26,10 @@ def kernel(function: F) -> F:
 
 
 @lru_cache
-def _stamp(folder: Path) -> str:
+def _stamp(folder: Path) -> bytes:
     """What all files with compiled functions in a folder say."""
     sources = (path.read_bytes() for path in sorted(folder.glob("*.py")))
-    return hashlib.sha256(b"\0".join(source for source in sources if MARK in source)).hexdigest()
+    return hashlib.sha256(b"\0".join(source for source in sources if MARK in source)).digest()
 
 
 class _ByFolder:
@@ -37,7 +37,7 @@ class _ByFolder:
 
     _py_file: str
 
-    def get_source_stamp(self) -> str:
+    def get_source_stamp(self) -> bytes:
         return _stamp(Path(self._py_file).parent)
 
 

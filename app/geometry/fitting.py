@@ -33,6 +33,13 @@ def face_sums(vertices: Array, faces: NDArray[np.integer]) -> Array:
     return _sums_of(np.ascontiguousarray(vertices, np.float64), np.ascontiguousarray(faces, np.int64))
 
 
+def sums_about(vertices: Array, faces: NDArray[np.integer], middle: Array, scale: float) -> Array:
+    """The 54 numbers of some faces together (54,), in coordinates (x - middle) / scale."""
+    corners = (vertices[faces] - middle).reshape(-1, 3) / scale
+    sums = _sums_of(corners, np.arange(len(corners)).reshape(-1, 3))
+    return _added(sums, np.zeros(len(sums), np.int64), 1)[0]
+
+
 @kernel
 def _sums_of(vertices, faces):  # pragma: no cover - compiled
     sums, power, side = np.zeros((len(faces), SIZE)), np.ones((3, 5)), np.empty((2, 3))

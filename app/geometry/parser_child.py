@@ -14,7 +14,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from app.errors import AppError
+from app.geometry.cleaning import edge_table
 from app.geometry.parsing import parse
 
 MEMORY_BYTES = 6 * 2**30
@@ -55,6 +58,7 @@ def run_child(request: dict[str, Any]) -> None:
 
 def main() -> None:
     """Serve requests until stdin ends."""
+    edge_table(np.array([[0, 1, 2]]))  # compiled, or loaded, once for all children
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C belongs to the server, which then closes stdin
     for line in iter(sys.stdin.buffer.readline, b""):
         child = os.fork()

@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.errors import InvalidInput
-from app.geometry.carry_over import locate
+from app.geometry.carry_over import PROBES, locate
 from app.geometry.cleaning import CleaningReport, areas, face_pairs
 from app.geometry.editing import best_neighbour, name_of
 from app.geometry.importing import ImportedPart
 from app.geometry.merge_tree import MergeTree
 from app.geometry.segmentation import part_tree
 from app.geometry.slicing import nearest_face
-from app.geometry.splitting import connected
+from app.geometry.splitting import Integers, connected
 from app.geometry.tool import Array, Tool
 
 PATCH = 1e-3  # RMS distance to a primitive / diagonal up to which faces beside the regions are one patch
@@ -38,8 +38,7 @@ def tree_for(tool: Tool, part: ImportedPart | None, tree: MergeTree | None) -> M
     if part is None:
         alone = ImportedPart(tool.mesh, np.full(len(tool.mesh.faces), -1, np.int32), CleaningReport(()))
         return part_tree(alone)
-    source, _ = locate(tool.mesh, part.mesh)
-    return (tree or part_tree(part)).on(source[:, 0])
+    return (tree or part_tree(part)).on(locate(tool.mesh, part.mesh, PROBES[:1])[:, 0])
 
 
 def piece_under(tool: Tool, tree: MergeTree, point: Array, level: int) -> Piece:
@@ -53,7 +52,8 @@ def piece_under(tool: Tool, tree: MergeTree, point: Array, level: int) -> Piece:
         raise InvalidInput("The point doesn't lie on the part.")
     region = int(tool.labels[face])
     area = areas(tool.mesh.vertices, tool.mesh.faces.astype(np.int64))
-    pieces = _walk(tool, tree, face, area) if region >= 0 else _patches(tool, tree, face)
+    pairs = face_pairs(tool.mesh.faces)
+    pieces = _walk(tool, tree, face, area, pairs) if region >= 0 else _patches(tool, tree, face, pairs)
     if not pieces:
         raise InvalidInput(f"{name_of(tool, region)} has no smaller piece at this point. Cut it along a line or by a plane instead.")
     at = (level - 1) % len(pieces)
@@ -63,13 +63,13 @@ def piece_under(tool: Tool, tree: MergeTree, point: Array, level: int) -> Piece:
     return Piece(faces, region if region >= 0 else None, at + 1, size, size / float(whole), best_neighbour(tool, faces))
 
 
-def _walk(tool: Tool, tree: MergeTree, face: int, area: Array) -> list[NDArray[np.bool_]]:
+def _walk(tool: Tool, tree: MergeTree, face: int, area: Array, pairs: Integers) -> list[NDArray[np.bool_]]:
     region = tool.labels == tool.labels[face]
     whole = area[region].sum()
     pieces: list[NDArray[np.bool_]] = []
     last = WHOLE * whole
     for mask in tree.children_of(tool.labels, face):
-        piece = _connected_part(tool, mask, face)
+        piece = _connected_part(mask, face, pairs)
         size = area[piece].sum()
         if size < last:
             pieces.append(piece)
@@ -77,15 +77,21 @@ def _walk(tool: Tool, tree: MergeTree, face: int, area: Array) -> list[NDArray[n
     return pieces
 
 
-def _patches(tool: Tool, tree: MergeTree, face: int) -> list[NDArray[np.bool_]]:
+def _patches(tool: Tool, tree: MergeTree, face: int, pairs: Integers) -> list[NDArray[np.bool_]]:
     patch = tree.cut(tolerance=PATCH)
-    first = _connected_part(tool, (patch == patch[face]) & (tool.labels < 0), face)
+    first = _connected_part((patch == patch[face]) & (tool.labels < 0), face, pairs)
     below = np.where(first, tool.n, tool.labels)
-    smaller = [_connected_part(tool, mask, face) for mask in tree.children_of(below, face)]
+    smaller = [_connected_part(mask, face, pairs) for mask in tree.children_of(below, face)]
     return [first, *(mask for mask in smaller if mask.sum() < first.sum())]
 
 
-def _connected_part(tool: Tool, mask: NDArray[np.bool_], face: int) -> NDArray[np.bool_]:
+def _connected_part(mask: NDArray[np.bool_], face: int, pairs: Integers) -> NDArray[np.bool_]:
     """What of a mask hangs together with a face."""
-    piece = connected(np.where(mask, -1, np.arange(len(mask))), face_pairs(tool.mesh.faces))
-    return mask & (piece == piece[face])
+    inside = np.flatnonzero(mask)
+    place = np.full(len(mask), -1)
+    place[inside] = np.arange(len(inside))
+    both = place[pairs]
+    piece = connected(np.zeros(len(inside), np.int64), both[(both[:, 0] >= 0) & (both[:, 1] >= 0)])
+    result = np.zeros(len(mask), bool)
+    result[inside] = piece == piece[place[face]]
+    return result

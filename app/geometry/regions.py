@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.errors import InvalidInput
-from app.geometry.attributes import Attributes, find_attributes
+from app.geometry.attributes import Attributes, find_attributes, region_boxes
 from app.geometry.borders import corner_neighbours, find_borders, opposite_lengths
 from app.geometry.descriptions import describe
 from app.geometry.fitting import face_sums
@@ -47,12 +47,8 @@ def measure_labelled(mesh: Mesh, labels: NDArray[np.int32], names: Sequence[str]
 
 def _plan_boxes(mesh: Mesh, labels: NDArray[np.int32]) -> tuple[Array, Array]:
     """Lower and upper corner (n, 2) of every region's box in plan view."""
-    n, inside = int(labels.max()) + 1, labels >= 0
-    corners = mesh.vertices[mesh.faces[inside], :2]
-    low, high = np.full((n, 2), np.inf), np.full((n, 2), -np.inf)
-    np.minimum.at(low, labels[inside], corners.min(axis=1))
-    np.maximum.at(high, labels[inside], corners.max(axis=1))
-    return low, high
+    low, high = region_boxes(mesh.vertices, mesh.faces, labels, int(labels.max()) + 1)
+    return low[:, :2], high[:, :2]
 
 
 def reading_order(low: Array, high: Array) -> NDArray[np.int64]:

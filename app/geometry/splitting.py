@@ -65,7 +65,8 @@ def _taken_out(surface: Surface, region: int) -> tuple[Surface, Surface]:
     """The faces of a region with all that touch them, and the rest: cutting the few is quicker than cutting all."""
     mark = np.zeros(len(surface.vertices), bool)
     mark[surface.faces[surface.labels == region]] = True
-    near = mark[surface.faces].any(axis=1)
+    a, b, c = mark[surface.faces].T
+    near: NDArray[np.bool_] = a | b | c
     return _chosen(surface, near), _chosen(surface, ~near)
 
 
@@ -118,7 +119,8 @@ def _at_new_vertices(faces: Integers, low: Integers, high: Integers, total: int)
     crossed, mark = low * total + high, np.zeros(total, bool)
     mark[low] = mark[high] = True
     middle = np.full(faces.shape, -1, np.int64)
-    near = np.flatnonzero(mark[faces].sum(axis=1) > 1)
+    a, b, c = mark[faces].T
+    near = np.flatnonzero((a & b) | (b & c) | (c & a))
     corners, following = faces[near], np.roll(faces[near], -1, axis=1)
     keys = np.minimum(corners, following) * total + np.maximum(corners, following)
     at = np.minimum(np.searchsorted(crossed, keys), len(crossed) - 1)
@@ -128,8 +130,8 @@ def _at_new_vertices(faces: Integers, low: Integers, high: Integers, total: int)
 
 def _subdivide(faces: Integers, middle: Integers, vertices: Array) -> tuple[Integers, Integers]:
     """Triangles (F', 3) after new vertices `middle` (F, 3; -1 none) on their edges, and the old face of each (F',)."""
-    count = (middle >= 0).sum(axis=1)
-    whole, one, two = (np.flatnonzero(count == n) for n in range(3))
+    a, b, c = (middle >= 0).T.astype(np.int8)
+    whole, one, two = (np.flatnonzero(a + b + c == n) for n in range(3))
     a, b, c, m, _ = _turned(faces, middle, one, np.argmax(middle[one] >= 0, axis=1))
     pieces = [faces[whole], np.stack([a, m, c], axis=1), np.stack([m, b, c], axis=1)]
     a, b, c, m, n = _turned(faces, middle, two, (np.argmin(middle[two] >= 0, axis=1) + 2) % 3)
@@ -192,9 +194,8 @@ def _cut_rows(surface: Surface, region: int, frame: Array, marked: Array, per_ro
 
 def _cut_along(surface: Surface, region: int, direction: Array, fractions: Array) -> tuple[Surface, Array]:
     """Cut a region where the given fractions of its area lie before; also the offsets of the planes."""
-    inside = surface.labels == region
-    corners = surface.vertices[surface.faces[inside]] @ direction
-    offsets = quantiles(corners, areas(surface.vertices, surface.faces[inside]), fractions)
+    faces = surface.faces[surface.labels == region]
+    offsets = quantiles((surface.vertices @ direction)[faces], areas(surface.vertices, faces), fractions)
     for offset in offsets:
         surface = cut_by_plane(surface, region, direction, float(offset))
     return surface, offsets
@@ -203,15 +204,16 @@ def _cut_along(surface: Surface, region: int, direction: Array, fractions: Array
 def quantiles(corners: Array, area: Array, fractions: Array) -> Array:
     """Positions with the given fractions of the area before, by a sweep that spreads each triangle from end to end."""
     grid = np.linspace(corners.min(), corners.max(), SWEEP)
-    return np.interp(fractions * area.sum(), _area_before(np.sort(corners, axis=1), area, grid), grid)
+    return np.interp(fractions * area.sum(), _area_before(corners, area, grid), grid)
 
 
 @kernel
 def _area_before(corners, area, grid):  # pragma: no cover - compiled
-    """Area of triangles with sorted corner positions (F, 3) before each place of the grid."""
+    """Area of triangles with corner positions (F, 3) before each place of the grid."""
     before, whole = np.zeros(len(grid)), np.zeros(len(grid) + 1)
     for f in range(len(area)):
-        first, middle, last = corners[f]
+        first, last = min(corners[f]), max(corners[f])
+        middle = corners[f, 0] + corners[f, 1] + corners[f, 2] - first - last
         k = np.searchsorted(grid, first)
         while k < len(grid) and grid[k] < last:
             x = grid[k]
@@ -226,19 +228,18 @@ def _area_before(corners, area, grid):  # pragma: no cover - compiled
 
 def _cell(surface: Surface, inside: NDArray[np.bool_], direction: Array, offsets: Array) -> Integers:
     """Number of planes before the middle of each chosen face."""
-    middle = surface.vertices[surface.faces[inside]].mean(axis=1) @ direction
-    return np.searchsorted(offsets, middle).astype(np.int64)
+    a, b, c = (surface.vertices @ direction)[surface.faces[inside]].T
+    return np.searchsorted(offsets, (a + b + c) / 3).astype(np.int64)
 
 
 def rectangle(surface: Surface, region: int) -> tuple[Array, Array]:
     """The two sides of the tightest rectangle around a region, longer first, as unit vectors (2, 3), and their lengths."""
     faces = surface.faces[surface.labels == region]
-    area = areas(surface.vertices, faces)
-    centres = surface.vertices[faces].mean(axis=1)
-    corners = surface.vertices[np.unique(faces)]
-    middle = np.average(centres, axis=0, weights=area)
-    offset = surface.vertices[faces] - middle
-    _, axes = np.linalg.eigh(np.einsum("f,fia,fib->ab", area, offset, offset))
+    weight = np.bincount(faces.ravel(), np.repeat(areas(surface.vertices, faces), 3))
+    used = np.flatnonzero(weight)
+    corners, weight = surface.vertices[used], weight[used]
+    middle = weight @ corners / weight.sum()
+    _, axes = np.linalg.eigh((corners - middle).T * weight @ (corners - middle))
     plane = axes[:, :0:-1].T  # the two widest directions
     flat = (corners - middle) @ plane.T
     try:
@@ -291,7 +292,8 @@ def _gather(surface: Surface, region: int, cells: Integers, parts: int, free: in
 def _shared_length(vertices: Array, faces: Integers, pairs: Integers) -> Array:
     """Length of the edge that each pair of faces shares (P,)."""
     first, second = faces[pairs[:, 0]], faces[pairs[:, 1]]
-    common = (first[:, :, None] == second[:, None, :]).any(axis=2)
-    corner = np.argsort(~common, axis=1, kind="stable")[:, :2]
-    ends = vertices[np.take_along_axis(first, corner, axis=1)]
-    return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    # the corner of the first face that the second doesn't have; the edge lies across from it
+    odd = np.stack([(first[:, k] != second[:, 0]) & (first[:, k] != second[:, 1]) & (first[:, k] != second[:, 2]) for k in range(3)])
+    at, rows = np.argmax(odd, axis=0), np.arange(len(first))
+    side = vertices[first[rows, (at + 1) % 3]] - vertices[first[rows, (at + 2) % 3]]
+    return np.sqrt(np.einsum("ij,ij->i", side, side))

@@ -2,6 +2,7 @@
 
 import io
 import json
+import zipfile
 from dataclasses import fields
 from typing import Any
 
@@ -11,6 +12,7 @@ from app.geometry.importing import CleaningReport, ImportedPart
 from app.geometry.parsed import cad_faces_from_json, cad_faces_to_json
 from app.geometry.tool import Mesh, Region, RegionGraph, Tool
 
+QUICK = 1  # compression level: a tenth larger than the usual 6 and three times as quick, and somebody waits
 MEDIA_TYPE = "application/x-npz"
 GRAPH_ARRAYS = tuple(f.name for f in fields(RegionGraph) if f.name != "source")
 REGION_WORDS = ("name", "description", "kind")
@@ -21,7 +23,10 @@ def pack(words: Any, **arrays: Any) -> bytes:
     """An .npz; the same values give the same bytes."""
     file = io.BytesIO()
     text = np.frombuffer(json.dumps(words).encode(), np.uint8)
-    np.savez_compressed(file, words=text, **arrays)
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=QUICK) as archive:
+        for name, values in {"words": text, **arrays}.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as place:
+                np.lib.format.write_array(place, np.asanyarray(values), allow_pickle=False)
     return file.getvalue()
 
 

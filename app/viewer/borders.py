@@ -1,42 +1,49 @@
 """Lines on the part: the borders of its regions, lifted off the surface so that the lines are not swallowed by it."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
+from app.geometry.borders import find_borders
+from app.geometry.cleaning import edge_table
 from app.geometry.tool import Array, Mesh, Tool
+
+
+@dataclass(frozen=True)
+class Lines:
+    """Border segments, points above the surface in metres."""
+
+    every: Array  # (E, 2, 3) each segment once
+    rims: tuple[Array, ...]  # per region (E_r, 2, 3) the segments of its border
 
 
 def rim(faces: NDArray[np.int32]) -> NDArray[np.int32]:
     """Edges (E, 2) that belong to exactly one of the faces."""
-    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    unique, count = np.unique(edges, axis=0, return_counts=True)
-    return unique[count == 1]
+    edges, _, count = edge_table(faces)
+    return edges[count == 1].astype(np.int32)
 
 
 def vertex_normals(mesh: Mesh, faces: NDArray[np.int32]) -> Array:
     """Unit normals (V, 3) averaged by area over `faces`; zero at vertices none of them touches."""
     a, b, c = (mesh.vertices[faces[:, k]] for k in range(3))
     doubled = np.cross(b - a, c - a)
-    normals = np.zeros_like(mesh.vertices)
-    for k in range(3):
-        np.add.at(normals, faces[:, k], doubled)
+    corners = faces.T.ravel()
+    summed = [np.bincount(corners, np.tile(doubled[:, k], 3), len(mesh.vertices)) for k in range(3)]
+    normals = np.stack(summed, axis=1)
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     return normals / np.where(length > 0, length, 1)
 
 
-def region_rims(tool: Tool, lift: float) -> tuple[Array, ...]:
-    """Per region the segments (E, 2, 3) of its border, `lift` metres above the surface."""
-    normals = vertex_normals(tool.mesh, tool.mesh.faces[tool.labels >= 0])
-    lifted = tool.mesh.vertices + lift * normals
-    return tuple(lifted[rim(tool.mesh.faces[tool.labels == region])] for region in range(tool.n))
-
-
-def all_borders(tool: Tool, lift: float) -> Array:
-    """Every border segment once (E, 2, 3), `lift` metres above the surface."""
-    normals = vertex_normals(tool.mesh, tool.mesh.faces[tool.labels >= 0])
-    lifted = tool.mesh.vertices + lift * normals
-    rims = [rim(tool.mesh.faces[tool.labels == region]) for region in range(tool.n)]
-    return lifted[np.unique(np.concatenate(rims), axis=0)] if rims else np.empty((0, 2, 3))
+def find_lines(tool: Tool, lift: float) -> Lines:
+    """The borders of all regions, `lift` metres above the surface."""
+    borders = find_borders(tool.mesh, tool.labels)
+    at_border = np.zeros(len(tool.mesh.vertices), bool)
+    at_border[borders.ends] = True
+    a, b, c = at_border[tool.mesh.faces].T
+    lifted = tool.mesh.vertices + lift * vertex_normals(tool.mesh, tool.mesh.faces[(tool.labels >= 0) & (a | b | c)])
+    every = np.unique(np.sort(borders.ends, axis=1), axis=0)
+    return Lines(lifted[every], tuple(lifted[borders.ends[borders.region == r]] for r in range(tool.n)))
 
 
 def size(tool: Tool) -> float:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from viser import _messages  # private, guarded by tests/viewer/test_viser.py
 
 from app.geometry.tool import Array, Tool
-from app.viewer.borders import all_borders, part_of, region_rims, size
+from app.viewer.borders import find_lines, part_of, size
 from app.viewer.palette import Rgb, Theme, linear, rgb, theme
 from app.viewer.picture import Picture, RegionLook
 from app.viewer.projection import Camera, label_points
@@ -142,8 +142,9 @@ class Stage:
             mesh = self._add_mesh(f"/tool/r{region:03d}", vertices, faces, rgb(colours.body))
             self._listen(mesh, region)
             self._regions.append(mesh)
-        self._rims = region_rims(tool, LIFT * span)
-        self._draw_borders(all_borders(tool, LIFT * span), colours)
+        lines = find_lines(tool, LIFT * span)
+        self._rims = lines.rims
+        self._draw_borders(lines.every, colours)
 
     def _draw_borders(self, borders: Array, colours: Theme) -> None:
         if self._borders is not None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from app.viewer.borders import all_borders, region_rims
+from app.viewer.borders import find_lines
 from app.viewer.projection import FILL_HEIGHT, FILL_WIDTH, LEAST_ASPECT, Camera, camera_for, label_points, project
 from tests.viewer.fakes import sample_tool
 
@@ -51,16 +51,16 @@ def test_label_points_lie_on_their_regions() -> None:
 def test_border_of_every_region_is_closed() -> None:
     """Every border point has exactly two border segments, and neighbours share theirs."""
     tool = sample_tool()
-    rims = region_rims(tool, lift=0.0)
+    rims = find_lines(tool, lift=0.0).rims
     for segments in rims:
         _, count = np.unique(segments.reshape(-1, 3).round(9), axis=0, return_counts=True)
         assert (count == 2).all()
-    everything = all_borders(tool, lift=0.0)
+    everything = find_lines(tool, lift=0.0).every
     assert len(everything) < sum(map(len, rims))
 
 
 def test_lift_moves_lines_off_the_surface_outwards() -> None:
     tool = sample_tool()
-    gap = np.concatenate(region_rims(tool, lift=0.01)) - np.concatenate(region_rims(tool, lift=0.0))
+    gap = find_lines(tool, lift=0.01).every - find_lines(tool, lift=0.0).every
     assert np.allclose(np.linalg.norm(gap, axis=2), 0.01)
     assert (gap[..., 2] > 0).all(), "the working surface of this mould looks up everywhere"
