@@ -111,6 +111,11 @@ def answer_query(ctx: Ctx, query_id: str, body: NewAnswer, response: Response, k
 
 
 @router.post("/answers/{answer_id}/undo", response_model=ExpertQuery)
-def undo_answer(ctx: Ctx, answer_id: str, _key: IdempotencyKey = None) -> Json:
-    """Take an answer back while its round is open; the query is asked again."""
-    return workflow.undo_answer(ctx, answer_id)
+def undo_answer(
+    ctx: Ctx,
+    answer_id: str,
+    keep_later: Annotated[bool, Query(description="Let answers given later stay; only for queries of kind pair.")] = False,
+    _key: IdempotencyKey = None,
+) -> Json:
+    """Take an answer back; the query is asked again."""
+    return workflow.undo_answer(ctx, answer_id, keep_later)

@@ -5,7 +5,8 @@ anywhere with the same bytes. What an earlier step computed may be kept (`Memory
 
 Answers to a pair: "left" or "right" is how the expert would do the tool (a demonstration of it), "equal" means both are,
 "both_wrong" means neither is (show it), "cant_tell" says nothing. An answer that no weights agree with, beside all that was
-known before, is asked once more; if it stands it is left out and named.
+known before, is asked once more; and after every few answers the one that sits worst with the others is, so that slips come to
+light. Answers that then contradict each other are weighed (`weighing`), and those that sit ill with the others are named.
 """
 
 from collections.abc import Mapping
@@ -30,19 +31,20 @@ from app.learning.certified_state import CertifiedParameters, CertifiedResult, C
 from app.learning.conflicts import Conflict, conflict_words, conflicts
 from app.learning.cuts import CutPool, unit_rows
 from app.learning.outlook import Outlook, outlook
-from app.learning.pairs import PairQuestion, look_of, offers, question
+from app.learning.pairs import REPEAT, PairQuestion, look_of, offers, question
 from app.learning.performance_conflict import Contradiction, contradiction_words, find_contradiction
 from app.learning.performance_state import LearningDemonstration, Metric
 from app.learning.qp import Array
 from app.learning.questions import fingerprint
+from app.learning.weighing import ILL, TELLING, Given, Repeats, Weighed, repeats_of, weigh
 from app.sequencing.features import DEFAULT_INTERACTIONS, Interaction
 from app.sequencing.problem import EXACT_LIMIT, SequencingProblem
 
 Answers = Mapping[str, str]  # fingerprint -> "left" | "right" | "equal" | "cant_tell" | "both_wrong"
+Answered = tuple[tuple[str, str], ...]  # fingerprints and answers in the order asked
 Demonstrations = Ordered[LearningDemonstration]
 Tools = Ordered[SequencingProblem]  # tools of interest: those without a demonstration
 
-REPEAT = "again|"  # before the fingerprint of a question that is asked a second time
 VIOLATED = 1e-7  # relative extra cost that counts as not the cheapest
 
 
@@ -54,11 +56,12 @@ class Known:
     members: tuple[int, ...]  # demonstrations of the pool that count, chosen orders after the recorded ones
     rows: Array  # (m, r) what comparisons say
     explored: Explored
-    left_out: tuple[str, ...]  # answers nothing agrees with
+    left_out: tuple[str, ...]  # answers nothing agrees with; once they are weighed, those that sit ill with the others
     closed: frozenset[int]  # tools whose order the expert has chosen, or has to show
     chosen: frozenset[int]  # the first kind
     contradiction: Contradiction | None = None
     conflicts: tuple[Conflict, ...] = ()  # the minimal sets behind it
+    weighed: Weighed | None = None  # answers contradict each other
 
 
 @dataclass
@@ -109,17 +112,22 @@ def certified_step(
     if state.demonstrations != _identity(demonstrations, tools):
         raise InvalidInput("The demonstrations are not the ones this run was started with; start a new run.")
     given = tuple((q.fingerprint, answers[q.fingerprint]) for q in state.asked if q.fingerprint in answers)
-    known = _known(demonstrations, tools, parameters, state, given, memory or Memory.empty())
+    memory = memory or Memory.empty()
+    known = _known(demonstrations, tools, parameters, state, given, memory)
+    base = _known(demonstrations, tools, parameters, state, (), memory)
+    repeats = repeats_of(state.asked, answers)
+    if _usable(base) and (repeats.changed or _contradict(known, parameters, state)):
+        known = _outweigh(base, known, tools, state, given, repeats)
     usable = _usable(known)
     wanted = {t: p for t, p in enumerate(tools) if usable and t not in gone}
     outlooks = {t: outlook(p, known.pool.frame, known.explored, parameters.tolerance) for t, p in wanted.items()}
     unanswered = tuple(q for q in state.asked if q.fingerprint not in answers)
-    fresh = () if unanswered or not usable else _fresh(state, parameters, known, outlooks)
+    fresh = () if unanswered or not usable else _check(base, tools, parameters, state, given) or _fresh(state, parameters, known, outlooks)
     u = known.explored.centre
     if known.explored.cone.empty or (known.contradiction and not known.contradiction.clear):
         u = compromise(known.pool, known.members, _prior(parameters))
     proof = certificate(known.pool, u, known.explored, usable, count_ties=not (fresh or unanswered))
-    report = _report(demonstrations, proof, outlooks, known)
+    report = _report(demonstrations, proof, outlooks, known, repeats)
     metric = _metric(state, report)
     state = replace(state, weights=tuple(float(x) for x in proof.weights), steps=state.steps + 1)
 
@@ -235,9 +243,8 @@ def _fresh(state: CertifiedState, parameters: CertifiedParameters, known: Known,
     if room < 1:
         return ()
     asked = {q.fingerprint: q for q in state.asked}
-    for name in known.left_out:
-        if not name.startswith(REPEAT) and REPEAT + name not in asked:
-            return (replace(asked[name], fingerprint=REPEAT + name, repeat=True, why=AGAIN),)
+    for name in _in_doubt(known, state):
+        return (_again(asked[name], AGAIN),)
     open_tools = {t: o for t, o in outlooks.items() if t not in known.closed and not o.agreed}
     looks: dict[int, set[tuple[int, ...]]] = {}
     for q in state.asked:
@@ -247,10 +254,59 @@ def _fresh(state: CertifiedState, parameters: CertifiedParameters, known: Known,
     return tuple(question(outlooks[o.tool], o, bool(flip)) for o, flip in zip(found, flips, strict=True))
 
 
+def _again(asked: PairQuestion, why: str) -> PairQuestion:
+    """The same question with its sides exchanged."""
+    return replace(asked, left=asked.right, right=asked.left, fingerprint=REPEAT + asked.fingerprint, repeat=True, why=why)
+
+
+def _in_doubt(known: Known, state: CertifiedState) -> list[str]:
+    """Answers that nothing agrees with and that weren't asked again yet."""
+    asked = {q.fingerprint for q in state.asked}
+    return [] if known.weighed else [n for n in known.left_out if not n.startswith(REPEAT) and REPEAT + n not in asked]
+
+
+def _contradict(known: Known, parameters: CertifiedParameters, state: CertifiedState) -> bool:
+    """Whether answers contradict what is known although they were asked again, or can't be any more."""
+    return bool(known.left_out) and (not _in_doubt(known, state) or len(state.asked) >= parameters.most)
+
+
+def _outweigh(base: Known, known: Known, tools: Tools, state: CertifiedState, given: Answered, repeats: Repeats) -> Known:
+    """What the demonstrations and all answers, weighed against each other, leave."""
+    asked = {q.fingerprint: q for q in state.asked}
+    told = [name for name, value in given if value in TELLING]
+    pool, generator = base.pool.copy(), np.random.default_rng([state.seed, 11, len(given)])
+    found = weigh(pool, base.explored, _told(tools, state, given), repeats.reliability, generator)
+    ill = tuple(name for name, agreement in zip(told, found.agreement, strict=True) if agreement < ILL)
+    reopened = {asked[name].tool for name in (*ill, *repeats.changed)}
+    return replace(base, pool=pool, explored=found.explored, left_out=ill, closed=known.closed - reopened, weighed=found)
+
+
+def _told(tools: Tools, state: CertifiedState, given: Answered) -> list[Given]:
+    asked = {q.fingerprint: q for q in state.asked}
+    return [Given(tools[asked[name].tool], asked[name].left, asked[name].right, value) for name, value in given if value in TELLING]
+
+
+def _check(base: Known, tools: Tools, parameters: CertifiedParameters, state: CertifiedState, given: Answered) -> tuple[PairQuestion, ...]:
+    """After every few answers the one that sits worst with the others, to be asked again; an answer can only be checked once."""
+    asked = {q.fingerprint: q for q in state.asked}
+    repeats = sum(q.repeat for q in state.asked)
+    told = [name for name, value in given if value in TELLING]
+    if len(state.asked) >= parameters.most or (len(given) - repeats) // parameters.check <= repeats:
+        return ()
+    left = [k for k, name in enumerate(told) if not asked[name].repeat and REPEAT + name not in asked]
+    if not left:
+        return ()
+    generator = np.random.default_rng([state.seed, 13, len(given)])
+    found = weigh(base.pool.copy(), base.explored, _told(tools, state, given), None, generator)
+    worst = min(left, key=lambda k: round(found.agreement[k], 9))
+    return (_again(asked[told[worst]], CHECK),)
+
+
+CHECK = "Asked a second time on purpose, with the sides exchanged: it shows how far single answers can be relied on."
 AGAIN = "Your answer to this question fits to none of the weights that explain the recorded orders. Please look once more."
 
 
-def _report(demonstrations: Demonstrations, proof: Certificate, outlooks: dict[int, Outlook], known: Known) -> Report:
+def _report(demonstrations: Demonstrations, proof: Certificate, outlooks: dict[int, Outlook], known: Known, repeats: Repeats) -> Report:
     count = len(demonstrations)
     chances = tuple(
         ToolChance(t, 1.0, 0.0, True, 1)  # the expert's own word
@@ -274,6 +330,9 @@ def _report(demonstrations: Demonstrations, proof: Certificate, outlooks: dict[i
         oracle_calls=proof.oracle_calls,
         proved=all(d.problem.n <= EXACT_LIMIT for d in demonstrations),
         unclear=known.left_out,
+        weighed=known.weighed is not None,
+        repeated=len(repeats.pairs),
+        repeated_alike=repeats.alike,
         conflicts=tuple(ConflictReport(c.members, c.slack, _resolving(c, demonstrations[0].problem)) for c in known.conflicts),
     )
 
@@ -304,6 +363,8 @@ def _closing(demonstrations: Demonstrations, report: Report, parameters: Certifi
     first = "The recorded order is the best one on its tool." if count == 1 else "Every recorded order is the best one on its tool."
     if not report.tools:
         return first
+    if known.weighed:
+        first = f"{first} Some answers contradict each other, so all were weighed against each other."
     unsettled = [t for t in report.tools if not t.agreed]
     if unsettled:
         return f"{first} {_count(len(unsettled), 'tool')} can still go more than one way; a recorded order there would settle it."

@@ -20,6 +20,7 @@ class CertifiedParameters:
     margin: float = 0.02  # compromise between contradicting demonstrations
     least: float = 0.01
     regularisation: float = 0.05
+    check: int = 6  # after so many answers one is asked again
     endorse: bool = True  # choosing an order says "I would do it like this", not only "better than the other"
 
 
@@ -28,6 +29,7 @@ CERTIFIED_WORDS: dict[str, tuple[str, str]] = {
     "samples": ("S", "Samples of the possible weights"),
     "most": ("Q", "Questions asked at most"),
     "batch": ("B", "Questions asked at a time"),
+    "check": ("R", "Answers before one is asked again as a check"),
     "margin": ("ζ", "Contradictions: margin wanted"),
     "least": ("w_min", "Contradictions: smallest weight"),
     "regularisation": ("λ", "Contradictions: keep weights small"),
@@ -72,7 +74,10 @@ class Report:
     oracle_calls: int
     proved: bool  # every demonstrated tool was searched completely
     conflicts: tuple[ConflictReport, ...] = ()
-    unclear: tuple[str, ...] = ()  # fingerprints of answers that contradict what was known and were left out
+    unclear: tuple[str, ...] = ()  # fingerprints of answers that sit ill with the others
+    weighed: bool = False  # the answers contradict each other, so they were weighed
+    repeated: int = 0  # questions answered twice
+    repeated_alike: int = 0  # of them, with the same answer
 
     def to_json(self) -> dict[str, Any]:
         """Plain JSON values."""

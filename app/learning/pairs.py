@@ -19,6 +19,8 @@ TRIED = 3  # pairs per tool looked at when an answer tells a tool's class: which
 SHOWING = 1.0  # cost of showing an order oneself, in answers: both were wrong
 TIE = 1e-12
 
+REPEAT = "again|"  # before the fingerprint of a question that is asked a second time
+
 Outlooks = Mapping[int, Outlook]  # tool index -> its outlook
 
 

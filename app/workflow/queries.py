@@ -106,8 +106,13 @@ def answer(ctx: Context, query_id: str, value: str, client_key: str | None = Non
     return ctx.store.write(change)
 
 
-def undo_answer(ctx: Context, answer_id: str) -> Json:
+def undo_answer(ctx: Context, answer_id: str, keep_later: bool = False) -> Json:
     """Take an answer back: the question is open again. A run that had moved on returns to where it asked.
+
+    Args:
+        ctx: Where.
+        answer_id: The answer.
+        keep_later: Answers that were given later stay; only for pairs, whose answers count side by side.
 
     Raises:
         Conflict: The answer doesn't count any more, or the run can't be taken up.
@@ -121,10 +126,15 @@ def undo_answer(ctx: Context, answer_id: str) -> Json:
             raise Conflict("This answer was taken back before.")
         if query.state != "answered" or run.state == "cancelled":
             raise Conflict("The run this answer belongs to was stopped; let it go on first.")
+        if keep_later and query.kind != "pair":
+            raise InvalidInput(
+                "Only an answer to which of two orders is better can be taken back by itself; take it back with the later ones."
+            )
         _check_can_go_back(session, run)
         cancel_jobs(session, run.id)
         store_answer(session, query.id, "undone")
-        _go_back(session, run, query.checkpoint)
+        if not keep_later:
+            _go_back(session, run, query.checkpoint)
         query.state = "open"
         session.add(query)
         session.flush()

@@ -19,6 +19,7 @@ from app.learning.performance_conflict import contradiction_words
 from app.storage import emit
 from app.storage.tables import Demonstration, JobRow, Metric, PolicyRow, Query, Run, RunCheckpoint, RunDemonstration, Segmentation, ToolRow
 from app.workflow.authors import shown_name
+from app.workflow.consistency import consistency, ill_fitting
 from app.workflow.feature_choice import stored_features
 from app.workflow.lookup import current_segmentation, found, same_regions
 from app.workflow.run_rows import TRAINING_JOB, checkpoint_of, current_answer, go, learner, parameters_for, write_policy
@@ -209,12 +210,14 @@ def _named(session: Session, row: Run, report: Json) -> Json:
         }
         for c in report["conflicts"]
     ]
-    left_out = {"slack", "class_sizes", "identifiable"}
+    left_out = {"slack", "class_sizes", "identifiable", "repeated", "repeated_alike"}
     return {
         **{k: v for k, v in report.items() if k not in left_out},
         "demonstrations": demonstrated,
         "tools": tools,
         "conflicts": conflicts,
+        "unclear": ill_fitting(session, row, report["unclear"]),
+        "consistency": consistency(session, shown, report["repeated"], report["repeated_alike"]),
     }
 
 

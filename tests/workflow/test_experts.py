@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from app.errors import InvalidInput
-from app.workflow import coverage, demonstrations, record, runs, tools
+from app.workflow import coverage, demonstrations, queries, record, runs, tools
 from app.workflow.context import Context
 from tests.workflow.conftest import project_of
 
@@ -102,3 +102,51 @@ def test_with_one_expert_a_run_names_nobody(sample: Context, tool: Json) -> None
 def settled(ctx: Context, run: Json) -> Json:
     assert ctx.jobs.wait_idle(60)
     return runs.get_run(ctx, run["id"])
+
+
+def test_contradicting_answers_are_weighed_named_and_taken_back_alone(sample: Context) -> None:
+    """Sides alternate, so an expert who always says "left" contradicts the check; the run ends all the same and says which."""
+    params = {"tolerance": 0.0001, "check": 1, "most": 4}
+    run = settled(sample, runs.start_run(sample, project_of(sample)["id"], "performance", params))
+    while run["state"] == "waiting_for_expert":
+        for query in runs.list_queries(sample, run_id=run["id"], state="open"):
+            runs.answer(sample, query["id"], "left")
+        run = settled(sample, run)
+    assert run["state"] == "converged", run["message"]
+    report = run["report"]
+    assert report["weighed"] is True
+    assert report["consistency"]["answers_twice"] > report["consistency"]["answers_alike"]
+    assert report["consistency"]["text"].startswith(("One question was asked twice", "2 questions were asked twice"))
+    worst = report["unclear"][0]
+    before = {q["id"]: q["answer"] for q in runs.list_queries(sample, run_id=run["id"]) if q["answer"]}
+    assert before[worst["query_id"]]["id"] == worst["answer_id"]
+    query = queries.undo_answer(sample, worst["answer_id"], keep_later=True)
+    assert (query["id"], query["state"]) == (worst["query_id"], "open")
+    after = {q["id"]: q["answer"] for q in runs.list_queries(sample, run_id=run["id"]) if q["answer"]}
+    assert after == {k: v for k, v in before.items() if k != worst["query_id"]}
+    runs.answer(sample, query["id"], "cant_tell")
+    again = settled(sample, run)
+    assert worst["query_id"] not in {entry["query_id"] for entry in again["report"]["unclear"]}
+
+
+def test_an_order_recorded_again_measures_consistency(sample: Context, tool: Json) -> None:
+    """Kendall's tau with the expert's earlier order; one that was deleted was a mistake and doesn't count."""
+    n = tool["region_count"]
+    order, swapped = list(range(n)), [1, 0, *range(2, n)]
+    first = demonstrations.create_demonstration(sample, tool["id"], order, author="Anna")
+    demonstrations.create_demonstration(sample, tool["id"], swapped, author="Anna")
+    demonstrations.create_demonstration(sample, tool["id"], order[::-1], author="Ben")
+
+    def again() -> Json:
+        run = settled(sample, runs.start_run(sample, tool["project_id"], "performance", authors=["Anna"]))
+        if run["state"] == "waiting_for_expert":
+            runs.cancel(sample, run["id"])
+        return run["report"]["consistency"]
+
+    found = again()
+    assert (found["orders_again"], found["orders_same"]) == (1, 0)
+    assert found["orders_agreement"] == pytest.approx(1 - 4 / (n * (n - 1)), abs=1e-4)
+    assert "recorded a second time" in found["text"]
+    now = demonstrations.get_demonstration(sample, first["id"])
+    demonstrations.delete_demonstration(sample, first["id"], now["version"])
+    assert again()["orders_again"] == 0
