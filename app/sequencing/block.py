@@ -1,18 +1,21 @@
-"""The exact dynamic program over all states on the fly, compiled (Sec. IV-B): no table of costs is built.
+"""The exact dynamic program over all states, compiled (Sec. IV-B): no graph is built, no table of costs either.
 
-A state s is a bit mask of finished regions. V(s), the cheapest cost from s to the end, is the minimum over the next region a of
-c(s, a) + V(s | a), filled in from the full set downwards; costs may be negative. The trick is to split s = high bits | low bits.
-For a region a among the high bits the successors of all 64 states that share their high bits lie side by side in V, so what
-depends on a is computed for 64 lanes at once and vectorises. Only the six regions of the low bits look inside the block.
+A state s is a bit mask of finished regions. V(s), the cheapest cost from s to the end, is
 
-    for each block of 64 states, from the last to the first:
-        means and set values of the lanes
-        for each high region a not finished:   best = min(best, cost(a, lanes) + V[block with a])     64 lanes at once
-        for each low region a:                 cost(a, lanes), then V inside the block, lane by lane from the last
-        V[block] = best + what depends on the state only
+    V(s) = min over the regions a that are not in s of   c(s, a) + V(s | a)
 
-Blocks whose high bits hold the same number of regions don't need each other, so two threads can share them: `fill_parallel`
-deals out superblocks (all blocks with the same topmost bits) layer by layer.
+filled in from the full set downwards, so that every V(s | a) is known when V(s) asks for it; costs may be negative.
+`kernels.lowest_to_go` is just that, for a table of costs. This is the same, computing the costs on the way, sixty-four states
+at a time. A block is the states that share all but their low bits:
+
+    for each block, from the last to the first:
+        of the state:     the means of what is finished, and what depends on the set only
+        high regions a:   best = min(best, c(lanes, a) + V[the block with a])      64 lanes at once: they lie side by side
+        low regions a:    c(lanes, a), and V inside the block, lane by lane from the last
+        V[block] = best + what depends on the set only
+
+Costs come from the tables of `rows`, each for some of the bits. Superblocks (all blocks with the same topmost bits) that hold
+equally many topmost regions don't need each other, so threads can share them.
 """
 
 # pyright: reportArgumentType=false, reportCallIssue=false
@@ -22,164 +25,66 @@ from typing import NamedTuple
 
 import numba as nb
 import numpy as np
-from numpy.typing import NDArray
 
-from app.geometry.tool import Array
-from app.sequencing.forms import Form, Ints
+from app.sequencing.rows import LANES, LOW, Rows, Single, count_bits, first_passed
 
-Single = NDArray[np.float32]
-LOW = 6  # bits of a block
-LANES = 1 << LOW
 SMALLEST = LOW + 1  # regions; fewer are left to `nearly`
 FAST = {"nnan", "nsz", "contract", "arcp", "reassoc"}  # infinities stay: they mark what is not allowed
 
 
-class Rows(NamedTuple):
-    """A form laid out for the block kernel: what the high bits add, and what the lanes add."""
+class Scratch(NamedTuple):
+    """Where one block is worked out."""
 
-    middle: Single  # (F, 2^m, N) start and change of the regions of the middle bits
-    top: Single  # (F, 2^t, N) and of the topmost bits
-    lane: Single  # (F, N, K, 64) change and touch of the lanes; K levels that the high bits reach; infinite: not allowed yet
-    levels: int  # K
-    sum_middle: Single  # (Q, 2^m)
-    sum_top: Single  # (Q, 2^t)
-    sum_lane: Single  # (Q, 64)
-    tests: Ints  # (U, 3, N) bit masks
-    reached: Ints  # (U, N)
-    before: Ints  # (N,)
-    own: Single  # (T, N) T at least 2, padded with zeros
-    of: Ints  # (T,)
-    slope: Single  # (F, T)
-    drift: Single  # (F, Q)
-    ranked: NDArray[np.bool_]  # (F,)
-    rank: Single  # (F, N + 1, N)
-    state: Single  # (F, G)
-    flip: NDArray[np.bool_]  # (G,) read at the unfinished set
-    pair: Ints  # (P, 2)
-    weight: Single  # (P,)
-    stated: NDArray[np.bool_]  # (F,) depends on state values
-    ones: Ints  # (64,) regions of each lane
-    share: Single  # (N, 64) 1 / number finished, by the number of high regions
-    row: Ints  # (G,) row of the table of set values
-    extra: Single  # (N, 2^N) or (0, 0)
+    mean: Single  # (Q, 64) at least two rows
+    state: Single  # (F, 64) what depends on the set only
+    fixed: Single  # (F, N) what the high bits add for each region
+    value: Single  # (F, 64) of one region
+    low: Single  # (6, 64) cost of each low region
+    best: Single  # (64,) without what depends on the set only
 
 
 @nb.njit(cache=True, nogil=True)
-def lay_out(form: Form, middle_bits: int, top_bits: int, flip: NDArray[np.bool_], row: Ints, extra: Single) -> Rows:
-    """Tables of the sums over the middle, topmost and low bits."""
-    f, n = form.start.shape
-    u, q = len(form.reached), len(form.averaged)
-    middle, top = np.zeros((f, 1 << middle_bits, n), np.float32), np.zeros((f, 1 << top_bits, n), np.float32)
-    sum_middle, sum_top, sum_lane = np.zeros((q, 1 << middle_bits)), np.zeros((q, 1 << top_bits)), np.zeros((q, LANES))
-    for i in range(f):
-        _subset_rows(form.change[i], LOW, middle[i])
-        _subset_rows(form.change[i], LOW + middle_bits, top[i])
-        for s in range(1 << top_bits):
-            top[i, s] += form.start[i].astype(np.float32)
-    for k in range(q):
-        _subset_sums(form.averaged[k], 0, sum_lane[k])
-        _subset_sums(form.averaged[k], LOW, sum_middle[k])
-        _subset_sums(form.averaged[k], LOW + middle_bits, sum_top[k])
-        sum_top[k] += form.total[k]
-    tests = np.zeros((u, 3, n), np.int64)
-    for i in range(u):
-        for k in range(3):
-            for a in range(n):
-                for b in range(n):
-                    if form.tests[i, k, a, b]:
-                        tests[i, k, a] |= 1 << b
-    levels = 4**u
-    lane = np.zeros((f, n, levels, LANES), np.float32)
-    for i in range(f):
-        for a in range(n):
-            plain = np.zeros(LANES)
-            _subset_sums(form.change[i, a], 0, plain)
-            for k in range(levels):
-                for x in range(LANES):
-                    value = plain[x]
-                    for j in range(u):
-                        level = k >> (2 * j) & 3
-                        for test in range(level):
-                            if tests[j, test, a] & x:
-                                level = test
-                                break
-                        value += form.touch[i, j, level]
-                    if i == 0 and form.before[a] & (LANES - 1) & ~x:
-                        value = np.inf
-                    lane[i, a, k, x] = value
-    t = max(2, len(form.of))
-    own, of, slope = np.zeros((t, n), np.float32), np.zeros(t, np.int64), np.zeros((f, t), np.float32)
-    for k in range(len(form.of)):
-        own[k], of[k], slope[:, k] = form.own[k], form.of[k], form.slope[:, k]
-    ones, share = np.empty(LANES, np.int64), np.empty((n, LANES), np.float32)
-    for x in range(LANES):
-        ones[x] = _bits(x)
-        for above in range(n):
-            share[above, x] = 1 / max(form.count + above + ones[x], 1)
-    ranked, stated = np.zeros(f, np.bool_), np.zeros(f, np.bool_)
-    for i in range(f):
-        ranked[i] = (form.rank[i] != 0).any()
-        stated[i] = (form.state[i] != 0).any() or (form.drift[i] != 0).any()
-    return Rows(
-        middle, top, lane, levels, sum_middle.astype(np.float32), sum_top.astype(np.float32), sum_lane.astype(np.float32), tests,
-        form.reached, form.before, own, of, slope, form.drift.astype(np.float32),
-        ranked, _padded(form.rank), form.state.astype(np.float32), flip, form.pair, form.weight.astype(np.float32), stated,
-        ones, share, row, extra,
+def _scratch(rows: Rows) -> Scratch:
+    f, n = rows.middle.shape[0], rows.middle.shape[2]
+    return Scratch(
+        np.zeros((max(2, len(rows.sum_lane)), LANES), np.float32), np.empty((f, LANES), np.float32), np.empty((f, n), np.float32),
+        np.empty((f, LANES), np.float32), np.empty((LOW, LANES), np.float32), np.empty(LANES, np.float32),
     )  # fmt: skip
 
 
 @nb.njit(cache=True, nogil=True)
-def _padded(rank: Array) -> Single:
-    """One more row, for the full set."""
-    out = np.zeros((len(rank), rank.shape[1] + 1, rank.shape[2]), np.float32)
-    out[:, :-1] = rank
-    return out
+def fill(rows: Rows, sets: Single, v: Single) -> None:
+    """V of every state, one thread; `sets` (G', 2^N) holds the values that depend on a set only."""
+    scratch = _scratch(rows)
+    for top in range(rows.top.shape[1] - 1, -1, -1):
+        _fill_superblock(rows, sets, v, top, scratch)
 
 
-@nb.njit(cache=True, nogil=True)
-def _subset_sums(values: Array, first: int, out: Array) -> None:
-    """out[s] = the sum of values[first + i] over the bits i of s."""
-    bits = 0
-    while 1 << bits < len(out):
-        for s in range(1 << bits):
-            out[(1 << bits) | s] = out[s] + values[first + bits]
-        bits += 1
-
-
-@nb.njit(cache=True, nogil=True)
-def _subset_rows(change: Array, first: int, out: Single) -> None:
-    """out[s, a] = the sum of change[a, first + i] over the bits i of s."""
-    bits = 0
-    while 1 << bits < len(out):
-        for s in range(1 << bits):
-            for a in range(len(change)):
-                out[(1 << bits) | s, a] = out[s, a] + np.float32(change[a, first + bits])
-        bits += 1
-
-
-@nb.njit(inline="always")
-def _bits(x: int) -> int:
-    n = 0
-    while x:
-        x &= x - 1
-        n += 1
-    return n
+@nb.njit(cache=True, nogil=True, parallel=True)
+def fill_parallel(rows: Rows, sets: Single, v: Single) -> None:
+    """The same; superblocks with equally many topmost regions at the same time."""
+    tops = rows.top.shape[1]
+    layer = np.empty(tops, np.int64)
+    for ones in range(count_bits(tops - 1), -1, -1):
+        size = 0
+        for top in range(tops - 1, -1, -1):
+            if count_bits(top) == ones:
+                layer[size] = top
+                size += 1
+        for i in nb.prange(size):
+            _fill_superblock(rows, sets, v, layer[i], _scratch(rows))
 
 
 @nb.njit(cache=True, nogil=True, fastmath=FAST, error_model="numpy", _nrt=False)
-def fill_superblock(
-    rows: Rows, sets: Single, v: Single, top: int, mean: Single, state: Single, value: Single, low: Single, best: Single, fixed: Single
-) -> None:
-    """V of every state whose topmost bits are `top`; those with more of them are filled in already.
-
-    `sets` (G', 2^N) holds the values of sets; one row serves a value and the same value of the unfinished set.
-    """
+def _fill_superblock(rows: Rows, sets: Single, v: Single, top: int, scratch: Scratch) -> None:
+    """V of every state whose topmost bits are `top`; those with more of them are filled in already."""
     f, middles, n = rows.middle.shape
+    mean, state, fixed, value, low, best = scratch
     simple = len(rows.weight) == 0 and len(rows.extra) == 0 and not rows.ranked[0] and len(rows.of) <= 2
-    full, shift = np.int64((1 << n) - 1), _bits(middles - 1)
+    full, shift = np.int64((1 << n) - 1), count_bits(middles - 1)
     for m in range(middles - 1, -1, -1):
-        base = ((np.int64(top) << shift) | m) << LOW
-        above = _bits(base)
+        base = ((np.int64(top) << shift) | m) << LOW  # the block's first state: no low region finished
+        above = count_bits(base)
         _of_state(rows, sets, top, m, base, above, full, mean, state)
         for i in range(f):
             for a in range(n):
@@ -190,16 +95,17 @@ def fill_superblock(
             if base & bit:
                 continue
             out = low[a] if a < LOW else value[0]
-            if rows.before[a] & ~base & ~(LANES - 1):
+            if rows.before[a] & ~base & ~(LANES - 1):  # a high region must come first
                 out[:] = np.inf
                 continue
             level = _level(rows, base, a)
-            if simple and a >= LOW:
-                _simple_minimum(rows, fixed[0, a], rows.lane[0, a, level], mean, a, v[base | bit : (base | bit) + LANES], best)
+            after = v[base | bit : (base | bit) + LANES]
+            if a >= LOW and simple:
+                _simple_minimum(rows, fixed[0, a], rows.lane[0, a, level], mean, a, after, best)
                 continue
             _costs(rows, fixed, mean, state, level, a, above, base, value, out)
             if a >= LOW:
-                _take_minimum(best, out, v[base | bit : (base | bit) + LANES])
+                _take_minimum(best, out, after)
         _inside(low, best, v[base : base + LANES], state[0], base + LANES - 1 == full)
 
 
@@ -236,18 +142,13 @@ def _level(rows: Rows, base: int, a: int) -> int:
     """Which tests the high bits pass, two bits per cascade."""
     out = 0
     for u in range(len(rows.reached)):
-        level = rows.reached[u, a]
-        for k in range(level):
-            if rows.tests[u, k, a] & base:
-                level = k
-                break
-        out |= level << (2 * u)
+        out |= first_passed(rows.tests, u, a, base, rows.reached[u, a]) << (2 * u)
     return out
 
 
 @nb.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
 def _simple_minimum(rows: Rows, start: np.float32, lane: Single, mean: Single, a: int, after: Single, best: Single) -> None:
-    """The usual case in one pass: no product, no table, at most two means."""
+    """Cost and minimum in one pass, for the usual case: no product, no table, at most two distances from a mean."""
     slope, own, one = rows.slope[0, 0], rows.own[0, a], mean[rows.of[0]]
     other_slope, other, two = rows.slope[0, 1], rows.own[1, a], mean[rows.of[1]]
     for x in range(LANES):
@@ -257,7 +158,7 @@ def _simple_minimum(rows: Rows, start: np.float32, lane: Single, mean: Single, a
 
 @nb.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
 def _take_minimum(best: Single, cost: Single, after: Single) -> None:
-    for x in range(LANES):
+    for x in range(len(best)):
         total = cost[x] + after[x]
         best[x] = total if total < best[x] else best[x]
 
@@ -319,43 +220,4 @@ def _inside(low: Single, best: Single, v: Single, state: Single, full: bool) -> 
         for a in range(3, LOW):
             bit = 1 << a
             if at & (2 * bit - 1) == bit:  # `bit` lanes from here on are final
-                _serve(best[at - bit : at], low[a, at - bit : at], v[at : at + bit])
-
-
-@nb.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
-def _serve(best: Single, cost: Single, after: Single) -> None:
-    for x in range(len(best)):
-        total = cost[x] + after[x]
-        best[x] = total if total < best[x] else best[x]
-
-
-@nb.njit(cache=True, nogil=True)
-def _one(rows: Rows, sets: Single, v: Single, top: int) -> None:
-    f, n = rows.middle.shape[0], rows.middle.shape[2]
-    mean, state = np.zeros((max(2, len(rows.sum_lane)), LANES), np.float32), np.empty((f, LANES), np.float32)
-    value, low = np.empty((f, LANES), np.float32), np.empty((LOW, LANES), np.float32)
-    best, fixed = np.empty(LANES, np.float32), np.empty((f, n), np.float32)
-    fill_superblock(rows, sets, v, top, mean, state, value, low, best, fixed)
-
-
-@nb.njit(cache=True, nogil=True)
-def fill(rows: Rows, sets: Single, v: Single) -> None:
-    """V of every state, one thread."""
-    for top in range(rows.top.shape[1] - 1, -1, -1):
-        _one(rows, sets, v, top)
-
-
-@nb.njit(cache=True, nogil=True, parallel=True)
-def fill_parallel(rows: Rows, sets: Single, v: Single) -> None:
-    """V of every state; superblocks with equally many topmost regions at the same time."""
-    tops = rows.top.shape[1]
-    most = _bits(tops - 1)
-    layer = np.empty(tops, np.int64)
-    for ones in range(most, -1, -1):
-        size = 0
-        for top in range(tops - 1, -1, -1):
-            if _bits(top) == ones:
-                layer[size] = top
-                size += 1
-        for i in nb.prange(size):
-            _one(rows, sets, v, layer[i])
+                _take_minimum(best[at - bit : at], low[a, at - bit : at], v[at : at + bit])

@@ -63,8 +63,8 @@ def best_classes(
     solution = solve(problem, w, resolved)
     slack = tolerance * solution.scale
     if not solution.graph.complete:
-        found = shortest_sequence(problem, w, constraints=constraints)
-        return (CostClass(found.cost, found.ties, found.sequence),)
+        sequence = solution.named(solution.order)
+        return (CostClass(problem.cost_of(w, sequence), solution.ties, sequence),)
     graph, limit = _graph_of(solution, k, slack)
     totals = graph.classes(k + 1, slack)
     kept = [c for c in totals if c[0] <= limit][:k]
@@ -76,12 +76,12 @@ def _graph_of(solution: Solution, k: int, slack: float) -> tuple[Nearly, float]:
     """A graph that holds the k cheapest classes completely, and the total up to which it holds every class."""
     if not len(solution.v):
         return solution.graph, np.inf  # few regions: it holds every sequence
-    costs = beside(solution, slack)
+    costs, form = beside(solution, slack), solution.form
     graph, limit = solution.graph, solution.graph.lowest + slack
     reach = costs[min(FIRST_REACH, k, len(costs) - 1)] - graph.lowest
     while len([c for c in graph.classes(k, slack) if c[0] <= limit]) < k and np.isfinite(limit):
         limit = graph.lowest + reach if reach < 4 * solution.error / TOLERANCE else np.inf
-        wider = explore(solution.form, solution.v, solution.after, limit + slack + solution.error, CLASS_NODES)
+        wider = explore(form, solution.v, solution.after, limit + slack + solution.error, CLASS_NODES)
         if not wider.complete:
             return graph, graph.lowest + reach / 2
         graph, reach = wider, 2 * max(reach, 10 * slack)
@@ -92,9 +92,9 @@ def beside(solution: Solution, slack: float) -> list[float]:
     """Distinct costs of the sequences that leave the cheapest one once and go on in the best way, to single precision."""
     graph, node, spent, found = solution.graph, 0, 0.0, [solution.graph.lowest]
     n = solution.model.n
-    costs, state, last = np.empty(n), 0, n
+    costs, state, last, form = np.empty(n), 0, n, solution.form
     while node < graph.end:
-        step_costs(solution.form, state, costs)
+        step_costs(form, state, costs)
         a, following = next(graph.tied(node, solution.tolerance))
         for b in range(n):
             if np.isfinite(costs[b]):
@@ -141,19 +141,15 @@ def optimal_sequences(problem: SequencingProblem, w: Array, cap: int = CAP, cons
     resolved = resolve(constraints, problem.n)
     if not reason_against(problem, resolved):
         solution = solve(problem, w, resolved)
-        if solution.graph.complete:
-            found = tuple(solution.named(s) for s in solution.graph.members(solution.tolerance, cap))
-            return Equivalents(found, complete=len(found) == solution.graph.count(solution.tolerance))
+        found = tuple(solution.named(s) for s in solution.graph.members(solution.tolerance, cap))
+        return Equivalents(found, complete=solution.graph.complete and len(found) == solution.ties)
     return Equivalents((shortest_sequence(problem, w, constraints=constraints).sequence,), complete=False)
 
 
 def class_size(problem: SequencingProblem, w: Array, constraints: Constraints | None = None) -> int:
-    """Number of cheapest sequences; 1 where the exact search is out of reach."""
+    """Number of cheapest sequences, or of those met (at least 1) where not all are counted (`Shortest.counted`)."""
     resolved = resolve(constraints, problem.n)
-    if reason_against(problem, resolved):
-        return 1
-    solution = solve(problem, w, resolved)
-    return solution.graph.count(solution.tolerance) if solution.graph.complete else 1
+    return 1 if reason_against(problem, resolved) else solve(problem, w, resolved).ties
 
 
 def equivalent_sequences(

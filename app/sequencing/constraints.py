@@ -7,7 +7,7 @@ transitions. `never_next` depends on the region worked on last.
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -44,6 +44,16 @@ class Resolved:
     free: tuple[int, ...]  # regions still to be ordered
     skip: tuple[int, ...]
     done: tuple[int, ...]  # in the order of work
+
+    @cached_property
+    def ordered(self) -> bool:
+        """Some region must come before another."""
+        return bool(self.before.any())
+
+    @cached_property
+    def parted(self) -> bool:
+        """Some region must not follow another directly."""
+        return bool(self.never_next.any())
 
 
 def resolve(constraints: Constraints | None, n: int, names: Sequence[str] | None = None) -> Resolved:

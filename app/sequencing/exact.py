@@ -12,17 +12,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.geometry.tool import Array
-from app.sequencing.block import LOW, SMALLEST, Single, fill, fill_parallel, lay_out
+from app.sequencing.answer import Prepared, laid_out, weighed
+from app.sequencing.block import SMALLEST, fill, fill_parallel
 from app.sequencing.constraints import Resolved
 from app.sequencing.features import declare
-from app.sequencing.forms import BETWEEN, PLAIN, WITHIN, Declared, Form, Ints, compose, weigh
+from app.sequencing.forms import BETWEEN, PLAIN, WITHIN, Declared, Form, Ints, compose
 from app.sequencing.gaps import box_table, hull_gaps
 from app.sequencing.problem import SequencingProblem
+from app.sequencing.rows import Single
 from app.sequencing.structure import Sets
 
 THREADS_FROM = 16  # regions; below, starting threads costs more than they save
 CHUNK = 1 << 14  # sets evaluated at a time
-TOP_BITS = 8  # superblocks that threads share
+NO_TABLE = np.zeros((0, 0))
 
 
 @dataclass(frozen=True)
@@ -38,15 +40,7 @@ class Model:
     """A tool and the regions still to be ordered, ready for any weights."""
 
     resolved: Resolved
-    declared: Declared
-    factors: Array  # (F - 1, n) columns that each factor of an interaction adds up
-    pair: Ints  # (P, 2) factors of each declared interaction
-    products: tuple[int, ...]  # its column
-    empty: Array  # (N', n + m) values where nothing is finished
-    before: Ints  # (N',) bit masks over the free regions
-    sets: Single  # (G', 2^N') values of sets
-    row: Ints  # (G,)
-    flip: NDArray[np.bool_]  # (G,)
+    prepared: Prepared
     tables: dict[int, Array]  # (N', 2^N') values of the columns without structure
 
     @property
@@ -56,14 +50,18 @@ class Model:
 
 def bytes_needed(problem: SequencingProblem, n: int) -> float:
     """Memory of the tables for n regions still to be ordered: costs-to-go, values of sets, undeclared columns."""
-    if "declared" not in problem.kept:
-        problem.kept["declared"] = compose(declare(problem.graph, problem.features), problem.n, tuple(range(problem.n)), ())
-    declared = problem.kept["declared"]
+    per_set = problem.kept.setdefault(("bytes", n), None) or _bytes_per_set(problem, n)
+    problem.kept["bytes", n] = per_set
+    return 2.0**n * per_set
+
+
+def _bytes_per_set(problem: SequencingProblem, n: int) -> float:
+    declared = compose(declare(problem.graph, problem.features), problem.n, tuple(range(problem.n)), ())
     missing = set(declared.undeclared)
     factors = [{*problem.features.factors[i.first], *problem.features.factors[i.second]} for i in problem.interactions]
     tables = len(missing) + sum(bool(missing & f) for f in factors)
     values = _tables_of(declared, whole=n == problem.n)[2]
-    return 2.0**n * (4 + 4 * values + (8 * tables + 12 * (tables > 0)) * n)
+    return 4 + 4 * values + (8 * tables + 12 * (tables > 0)) * n
 
 
 def why_not_exact(problem: SequencingProblem, n: int, limits: Limits) -> str | None:
@@ -78,7 +76,7 @@ def why_not_exact(problem: SequencingProblem, n: int, limits: Limits) -> str | N
 
 def model_for(problem: SequencingProblem, resolved: Resolved) -> Model:
     """The model of what is left to be ordered; the one of the whole tool is kept."""
-    whole = len(resolved.free) == problem.n and not resolved.before.any()
+    whole = len(resolved.free) == problem.n and not resolved.ordered
     if whole and "model" in problem.kept:
         return problem.kept["model"]
     model = _build(problem, resolved)
@@ -112,9 +110,13 @@ def _build(problem: SequencingProblem, resolved: Resolved) -> Model:
         _fill_sets(declared, row, flip, n, sets)
     tables = _column_tables(problem, resolved, tabled)
     empty = problem.values(np.zeros((1, problem.n), np.bool_))[0][order]
-    return Model(
-        resolved, declared, factors, np.array(pair, np.int64).reshape(-1, 2), tuple(products), empty, before, sets, row, flip, tables
+    undeclared = np.zeros(width, np.bool_)
+    undeclared[list(declared.undeclared)] = True
+    prepared = Prepared(
+        declared.shape, undeclared, factors, np.array(pair, np.int64).reshape(-1, 2), np.array(products, np.int64), empty, before, sets,
+        row, flip,
     )  # fmt: skip
+    return Model(resolved, prepared, tables)
 
 
 def _tables_of(declared: Declared, whole: bool) -> tuple[Ints, NDArray[np.bool_], int]:
@@ -192,16 +194,14 @@ def _column_tables(problem: SequencingProblem, resolved: Resolved, columns: list
     return tables
 
 
+def extra_costs(model: Model, w: Array) -> Array:
+    """What the columns without structure add to each transition, (N', 2^N'); (0, 0) without any."""
+    return np.ascontiguousarray(sum(w[c] * table for c, table in model.tables.items())) if model.tables else NO_TABLE
+
+
 def form_for(model: Model, w: Array) -> Form:
     """The model's cost under weights w (n + m,)."""
-    width = len(model.declared.shape.start)
-    plain = w[:width].copy()
-    plain[list(model.declared.undeclared)] = 0.0
-    extra = sum((w[c] * table for c, table in model.tables.items()), start=np.zeros((0, 0)) if not model.tables else 0.0)
-    return weigh(
-        model.declared.shape, np.concatenate([plain[None, :], model.factors]), model.pair, w[list(model.products)], model.before,
-        model.empty @ w, np.ascontiguousarray(extra),
-    )  # fmt: skip
+    return weighed(model.prepared, w.copy(), extra_costs(model, w))
 
 
 def parallel_is_safe() -> bool:
@@ -213,45 +213,16 @@ def parallel_is_safe() -> bool:
     return nb.config.NUMBA_NUM_THREADS > 1  # type: ignore[attr-defined]
 
 
+def uses_threads(n: int) -> bool:
+    """Whether costs-to-go of n regions are worked out by several threads."""
+    return n >= THREADS_FROM and parallel_is_safe()
+
+
 def costs_to_go(model: Model, form: Form, threads: bool | None = None) -> Single:
     """V of every state, (2^N',) in single precision; at least SMALLEST regions. V of the empty state is left to `nearly`."""
-    n = model.n
-    high = n - LOW
-    top = min(TOP_BITS, (high + 1) // 2)
-    rows = lay_out(form, high - top, top, model.flip, model.row, form.extra.astype(np.float32))
-    v = np.empty(1 << n, np.float32)
-    if (n >= THREADS_FROM and parallel_is_safe()) if threads is None else threads:
-        fill_parallel(rows, model.sets, v)
+    rows, v = laid_out(model.prepared, form), np.empty(1 << model.n, np.float32)
+    if uses_threads(model.n) if threads is None else threads:
+        fill_parallel(rows, model.prepared.sets, v)
     else:
-        fill(rows, model.sets, v)
+        fill(rows, model.prepared.sets, v)
     return v
-
-
-@nb.njit(cache=True, nogil=True)
-def magnitude(form: Form) -> float:
-    """What no sum of absolute costs along a sequence exceeds: rounding errors are measured against it."""
-    f, n = form.start.shape
-    bound, total = np.zeros(f), 0.0
-    for a in range(n):
-        for i in range(f):
-            x = abs(form.start[i, a]) + np.abs(form.change[i, a]).sum() + np.abs(form.rank[i, :, a]).max()
-            for u in range(len(form.reached)):
-                x += np.abs(form.touch[i, u]).max()
-            for t in range(len(form.of)):
-                x += abs(form.slope[i, t]) * (abs(form.own[t, a]) + np.abs(form.averaged[form.of[t]]).max())
-            for q in range(len(form.averaged)):
-                x += abs(form.drift[i, q]) * np.abs(form.averaged[q]).max()
-            for g in range(form.state.shape[1]):
-                x += abs(form.state[i, g]) * max(1.0, np.abs(form.values.matrix[g]).sum())
-            bound[i] = x
-        cost = max(bound[0], abs(form.first[a]))
-        for p in range(len(form.weight)):
-            cost += abs(form.weight[p]) * bound[form.pair[p, 0]] * bound[form.pair[p, 1]]
-        if len(form.extra):
-            largest = 0.0
-            for s in range(form.extra.shape[1]):
-                if not s >> a & 1:
-                    largest = max(largest, abs(form.extra[a, s]))
-            cost += largest
-        total += cost
-    return total

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.geometry.tool import Array
-from app.sequencing.gaps import box_gaps, hull_gaps
+from app.sequencing.gaps import box_gap, hull_gaps
 from app.sequencing.structure import Between, Declaration, FirstTouch, Gap, MeanStep, Pairwise, Rank, Undeclared
 
 Ints = NDArray[np.int64]
@@ -203,41 +203,49 @@ def weigh(shape: Shape, mix: Array, pair: Ints, weight: Array, before: Ints, fir
     slope, drift = np.zeros((f, shape.slope.shape[1])), np.zeros((f, shape.drift.shape[1]))
     for i in range(f):
         for j in range(c):
-            m = mix[i, j]
-            if m != 0:
-                start[i] += m * shape.start[j]
-                change[i] += m * shape.change[j]
-                rank[i] += m * shape.rank[j]
-                touch[i] += m * shape.touch[j]
-                slope[i] += m * shape.slope[j]
-                drift[i] += m * shape.drift[j]
-                state[i] += m * shape.state[j]
+            if mix[i, j] != 0:
+                start[i] += mix[i, j] * shape.start[j]
+                _add_multiple(change[i], mix[i, j], shape.change[j])
+                _add_multiple(rank[i], mix[i, j], shape.rank[j])
+                _add_multiple(touch[i], mix[i, j], shape.touch[j])
+                for t in range(slope.shape[1]):
+                    slope[i, t] += mix[i, j] * shape.slope[j, t]
+                for q in range(drift.shape[1]):
+                    drift[i, q] += mix[i, j] * shape.drift[j, q]
+                for k in range(g):
+                    state[i, k] += mix[i, j] * shape.state[j, k]
     return Form(
         start, change, shape.tests, shape.reached, touch, shape.averaged, shape.total, shape.count, shape.own, shape.of, slope, drift,
         rank, state, shape.values, pair, weight, before, first, extra,
     )  # fmt: skip
 
 
+@nb.njit(cache=True, nogil=True, inline="always")
+def _add_multiple(out: Array, factor: float, values: Array) -> None:
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] += factor * values[i, j]
+
+
 @nb.njit(cache=True, nogil=True)
 def set_value(v: SetValues, g: int, s: int) -> float:
     """Value g of the state s."""
-    inside = np.zeros((1, len(v.done)), np.bool_)
-    inside[0] = v.done
+    inside = v.done.copy()
     for i in range(len(v.free)):
         if s >> i & 1:
-            inside[0, v.free[i]] = True
+            inside[v.free[i]] = True
     if v.kind[g] == BETWEEN:
         total = 0.0
-        for b in range(len(v.done)):
-            for c in range(len(v.done)):
-                if inside[0, b] and not inside[0, c]:
+        for b in range(len(inside)):
+            for c in range(len(inside)):
+                if inside[b] and not inside[c]:
                     total += v.matrix[g, b, c]
         return total
     if v.left[g]:
-        inside[0] = ~inside[0]
+        inside = ~inside
     if v.kind[g] == HULL:
-        return hull_gaps(inside, v.low[g], v.high[g], v.area[g])[0]
-    return box_gaps(inside, v.low[g], v.high[g], v.area[g], v.kind[g] == PLAIN)[0]
+        return hull_gaps(inside.reshape(1, -1), v.low[g], v.high[g], v.area[g])[0]
+    return box_gap(inside, v.low[g], v.high[g], v.area[g], v.kind[g] == PLAIN)
 
 
 @nb.njit(cache=True, nogil=True)
@@ -251,33 +259,20 @@ def step_costs(form: Form, s: int, out: Array) -> None:
         for a in range(n):
             out[a] = form.first[a] if form.before[a] == 0 else np.inf
         return
-    size, mean, members = form.count, form.total.copy(), np.empty(n, np.int64)
+    count, members = 0, np.empty(n, np.int64)
     for b in range(n):
         if s >> b & 1:
-            members[size - form.count] = b
-            size += 1
-            mean += form.averaged[:, b]
-    members = members[: size - form.count]
-    mean /= size
-    state = np.zeros(f)
-    for i in range(f):
-        for q in range(len(mean)):
-            state[i] += form.drift[i, q] * mean[q]
-    for g in range(form.state.shape[1]):
-        if (form.state[:, g] != 0).any():
-            state += form.state[:, g] * set_value(form.values, g, s)
-    value = np.empty(f)
+            members[count] = b
+            count += 1
+    members = members[:count]
+    mean, state, value = np.empty(len(form.total)), np.empty(f), np.empty(f)
+    _of_state(form, s, members, mean, state)
     for a in range(n):
-        out[a] = np.inf
         if s >> a & 1 or form.before[a] & ~s:
+            out[a] = np.inf
             continue
         for i in range(f):
-            x = state[i] + form.start[i, a] + form.rank[i, len(members), a]
-            for b in members:
-                x += form.change[i, a, b]
-            for t in range(len(form.of)):
-                x += form.slope[i, t] * abs(form.own[t, a] - mean[form.of[t]])
-            value[i] = x
+            value[i] = state[i] + _of_region(form, i, a, members, mean)
         for u in range(len(form.reached)):
             level = first_test(form, u, a, members)
             for i in range(f):
@@ -287,6 +282,37 @@ def step_costs(form: Form, s: int, out: Array) -> None:
             out[a] += form.weight[p] * value[form.pair[p, 0]] * value[form.pair[p, 1]]
         if len(form.extra):
             out[a] += form.extra[a, s]
+
+
+@nb.njit(cache=True, nogil=True)
+def _of_state(form: Form, s: int, members: Ints, mean: Array, state: Array) -> None:
+    """Means over what is finished, and what every F adds whichever region comes next."""
+    state[:] = 0.0
+    for q in range(len(mean)):
+        total = form.total[q]
+        for b in members:
+            total += form.averaged[q, b]
+        mean[q] = total / (form.count + len(members))
+        for i in range(len(state)):
+            state[i] += form.drift[i, q] * mean[q]
+    for g in range(form.state.shape[1]):
+        needed = False
+        for i in range(len(state)):
+            needed = needed or form.state[i, g] != 0
+        value = set_value(form.values, g, s) if needed else 0.0
+        for i in range(len(state)):
+            state[i] += form.state[i, g] * value
+
+
+@nb.njit(cache=True, nogil=True)
+def _of_region(form: Form, i: int, a: int, members: Ints, mean: Array) -> float:
+    """What F_i is for region a, without touch and what depends on the state only."""
+    x = form.start[i, a] + form.rank[i, len(members), a]
+    for b in members:
+        x += form.change[i, a, b]
+    for t in range(len(form.of)):
+        x += form.slope[i, t] * abs(form.own[t, a] - mean[form.of[t]])
+    return x
 
 
 @nb.njit(cache=True, nogil=True)

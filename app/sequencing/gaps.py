@@ -14,36 +14,29 @@ def box_gaps(inside: NDArray[np.bool_], low: Array, high: Array, area: Array, pl
     `low` and `high` (N, 2) are the regions' boxes. The box's area is its width by height if `plain`, else the regions'
     areas times the share of their own box inside it; a region without extent along an axis is inside or not.
     """
-    m, n = inside.shape
-    out = np.zeros(m)
-    lo, hi = np.zeros(2), np.zeros(2)
-    for i in range(m):
-        lo[:], hi[:] = np.inf, -np.inf
-        members, own = 0, 0.0
-        for a in range(n):
-            if inside[i, a]:
-                members += 1
-                own += area[a]
-                for k in range(2):
-                    lo[k], hi[k] = min(lo[k], low[a, k]), max(hi[k], high[a, k])
-        if members < 2:
-            continue
-        box = (hi[0] - lo[0]) * (hi[1] - lo[1])
-        if not plain:
-            box = 0.0
-            for b in range(n):
-                share = 1.0
-                for k in range(2):
-                    common = min(high[b, k], hi[k]) - max(low[b, k], lo[k])
-                    extent = high[b, k] - low[b, k]
-                    if extent > 0:
-                        share *= max(common, 0.0) / extent
-                    elif common < 0:
-                        share = 0.0
-                box += share * area[b]
-        if box > 0:  # walls have no area in plan view
-            out[i] = 1 - own / box
+    out = np.empty(len(inside))
+    for i in range(len(inside)):
+        out[i] = box_gap(inside[i], low, high, area, plain)
     return out
+
+
+@nb.njit(cache=True, nogil=True)
+def box_gap(inside: NDArray[np.bool_], low: Array, high: Array, area: Array, plain: bool) -> float:
+    """`box_gaps` of one set."""
+    x0, y0, x1, y1 = np.inf, np.inf, -np.inf, -np.inf
+    members, own = 0, 0.0
+    for a in range(len(inside)):
+        if inside[a]:
+            members, own = members + 1, own + area[a]
+            x0, y0, x1, y1 = min(x0, low[a, 0]), min(y0, low[a, 1]), max(x1, high[a, 0]), max(y1, high[a, 1])
+    if members < 2:
+        return 0.0
+    box = (x1 - x0) * (y1 - y0)
+    if not plain:
+        box = 0.0
+        for b in range(len(inside)):
+            box += _common(low[b, 0], high[b, 0], x0, x1) * _common(low[b, 1], high[b, 1], y0, y1) * area[b]
+    return 1 - own / box if box > 0 else 0.0  # walls have no area in plan view
 
 
 @nb.njit(cache=True)

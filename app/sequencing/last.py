@@ -48,9 +48,9 @@ def regripping(grip: NDArray[np.int64]) -> LastFeature:
 
 def after_last(features: tuple[LastFeature, ...], w: Array, resolved: Resolved) -> Array:
     """What a free region adds after another, (N' + 1, N'), last row at the start; (0, 0) where nothing depends on it."""
-    free = np.array(resolved.free, np.int64)
-    if not len(free) or (not features and not resolved.never_next.any()):
+    if not resolved.free or (not features and not resolved.parted):
         return np.zeros((0, 0))
+    free = np.array(resolved.free, np.int64)
     between, start = np.where(resolved.never_next, np.inf, 0.0), np.zeros(len(resolved.before))
     for weight, f in zip(w, features, strict=True):
         between, start = between + weight * f.between, start + weight * f.start

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from app.geometry.tool import Array
 from app.sequencing.forms import Form, Ints, step_costs
 
-MOST_NODES = 2_000_000
 Counts = NDArray[np.uint64]  # (..., 2) high and low 64 bits
 
 
@@ -34,16 +33,16 @@ class Nearly:
     to: Ints  # (E,)
     end: int  # nodes from here on are final: every region finished
     n: int  # regions ordered
-    complete: bool  # False: too many nodes, the graph is of no use
+    complete: bool  # False: too many nodes; those of each layer with the cheapest ways through them are kept
     to_go: Array  # (M,) cheapest cost to a final node; infinite where there is none
 
     @property
     def lowest(self) -> float:
-        return float(self.to_go[0]) if self.complete else np.inf
+        return float(self.to_go[0])
 
     def count(self, tolerance: float) -> int:
         """Number of cheapest sequences."""
-        high, low = _count(self.first, self.cost, self.to, self.to_go, self.end, tolerance)[0]
+        high, low = ways_to_end(self.first, self.cost, self.to, self.to_go, self.end, tolerance)[0]
         return (int(high) << 64) + int(low)
 
     def tied(self, node: int, tolerance: float) -> Iterator[tuple[int, int]]:
@@ -99,7 +98,7 @@ class Nearly:
         return tuple(order)
 
 
-def explore(form: Form, v: NDArray[np.float32], after_last: Array, limit: float, most: int = MOST_NODES) -> Nearly:
+def explore(form: Form, v: NDArray[np.float32], after_last: Array, limit: float, most: int) -> Nearly:
     """The graph of all sequences of at most `limit`.
 
     Args:
@@ -107,16 +106,18 @@ def explore(form: Form, v: NDArray[np.float32], after_last: Array, limit: float,
         v: Cheapest costs-to-go (2^N,), (2^N * N,) by last region with `after_last`, or empty: then nothing is pruned.
         after_last: (N + 1, N) what region a adds after region b, the last row at the start; (0, 0) where nothing depends on it.
         limit: Includes the rounding error of v.
-        most: Nodes; with more the graph is given up.
+        most: Nodes; with more the graph is of no use.
     """
     n = form.start.shape[1]
-    first, region, cost, to, end, complete = _explore(form, v, after_last, limit, most)
-    to_go = _lowest(first, cost, to, end) if complete else np.zeros(0)
-    return Nearly(first, region, cost, to, end, n, complete, to_go)
+    first, region, cost, to, end, complete = explore_compiled(form, v, after_last, limit, most, 0)
+    return Nearly(first, region, cost, to, end, n, complete, lowest_to_end(first, cost, to, end))
 
 
 @nb.njit(cache=True, nogil=True)
-def _explore(form: Form, v: NDArray[np.float32], after_last: Array, limit: float, most: int) -> tuple[Ints, Ints, Array, Ints, int, bool]:
+def explore_compiled(
+    form: Form, v: NDArray[np.float32], after_last: Array, limit: float, most: int, widest: int
+) -> tuple[Ints, Ints, Array, Ints, int, bool]:
+    """`explore`; with `widest` at most so many nodes per layer are kept, and never given up."""
     n = form.start.shape[1]
     by_last = len(after_last) > 0
     stride = n if by_last else 1
@@ -146,9 +147,12 @@ def _explore(form: Form, v: NDArray[np.float32], after_last: Array, limit: float
                 region[edges], cost[edges], to[edges], reach[edges] = a, c, key, so_far[i] + c
                 edges += 1
             first.append(edges)
-        nodes += len(here)
-        here = np.unique(to[begin:edges])
-        if nodes + len(here) > most:
+        before, nodes = nodes, nodes + len(here)
+        here = np.unique(to[begin:edges]) if edges > begin + 1 else to[begin:edges].copy()
+        if widest and len(here) > widest:
+            here = _cheapest(here, v, to[begin:edges], reach[begin:edges], widest)
+            edges = _only(here, first, before, begin, region, cost, to, reach)
+        elif not widest and nodes + len(here) > most:
             return np.array(first), region[:0], cost[:0], to[:0], nodes, False
         so_far = np.full(len(here), np.inf)
         for e in range(begin, edges):
@@ -162,6 +166,30 @@ def _explore(form: Form, v: NDArray[np.float32], after_last: Array, limit: float
 
 
 @nb.njit(cache=True, nogil=True)
+def _cheapest(keys: Ints, v: NDArray[np.float32], to: Ints, reach: Array, widest: int) -> Ints:
+    """The keys with the cheapest ways through them, in order."""
+    through = np.full(len(keys), np.inf)
+    for e in range(len(to)):
+        i = np.searchsorted(keys, to[e])
+        through[i] = min(through[i], reach[e] + v[to[e]])
+    return keys[np.sort(np.argsort(through, kind="mergesort")[:widest])]
+
+
+@nb.njit(cache=True, nogil=True)
+def _only(keys: Ints, first: list[int], node: int, begin: int, region: Ints, cost: Array, to: Ints, reach: Array) -> int:
+    """Drop the edges of the nodes from `node` on that lead to none of the keys; returns how many edges there are then."""
+    read, write = begin, begin
+    for i in range(node, len(first) - 1):
+        for e in range(read, first[i + 1]):
+            at = np.searchsorted(keys, to[e])
+            if at < len(keys) and keys[at] == to[e]:
+                region[write], cost[write], to[write], reach[write] = region[e], cost[e], to[e], reach[e]
+                write += 1
+        read, first[i + 1] = first[i + 1], write
+    return write
+
+
+@nb.njit(cache=True, nogil=True)
 def _longer(values, size):  # type: ignore[no-untyped-def]
     out = np.empty(size, values.dtype)
     out[: len(values)] = values
@@ -169,7 +197,8 @@ def _longer(values, size):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True, nogil=True)
-def _lowest(first: Ints, cost: Array, to: Ints, end: int) -> Array:
+def lowest_to_end(first: Ints, cost: Array, to: Ints, end: int) -> Array:
+    """Cheapest cost from every node to a final one."""
     v = np.full(max(len(first) - 1, end), np.inf)
     v[end:] = 0.0
     for i in range(end - 1, -1, -1):
@@ -187,7 +216,8 @@ def _add(sum_: Counts, more: Counts) -> None:
 
 
 @nb.njit(cache=True, nogil=True)
-def _count(first: Ints, cost: Array, to: Ints, v: Array, end: int, tolerance: float) -> Counts:
+def ways_to_end(first: Ints, cost: Array, to: Ints, v: Array, end: int, tolerance: float) -> Counts:
+    """Number of cheapest ways on from every node."""
     ways = np.zeros((len(v), 2), np.uint64)
     ways[end:, 1] = 1
     for i in range(end - 1, -1, -1):
@@ -195,6 +225,19 @@ def _count(first: Ints, cost: Array, to: Ints, v: Array, end: int, tolerance: fl
             if cost[e] + v[to[e]] <= v[i] + tolerance:
                 _add(ways[i], ways[to[e]])
     return ways
+
+
+@nb.njit(cache=True, nogil=True)
+def lowest_order(first: Ints, region: Ints, cost: Array, to: Ints, v: Array, end: int, tolerance: float) -> Ints:
+    """The cheapest sequence with the lowest region ids; empty when there is none."""
+    order, node = [0][:0], 0
+    while node < end and v[0] < np.inf:
+        for e in range(first[node], first[node + 1]):
+            if cost[e] + v[to[e]] <= v[node] + tolerance:
+                order.append(region[e])
+                node = to[e]
+                break
+    return np.array(order)
 
 
 @nb.njit(cache=True, nogil=True)

@@ -91,8 +91,7 @@ class SequencingProblem:
         """phi and phi_int of each step, (N, n + m), in the order of the sequence."""
         order = np.array(check_sequence(sequence, self.n), np.int64)
         if self.n <= TENSOR_LIMIT and not self.last:
-            bits = np.int64(1) << order
-            return self.tensor()[np.cumsum(bits) - bits, order]
+            self.tensor()
         return self.steps_of(order)
 
     def steps_of(self, order: Sequence[int] | NDArray[np.int64]) -> Array:
@@ -100,6 +99,9 @@ class SequencingProblem:
         order = np.asarray(order, np.int64)
         if not len(order):
             return np.zeros((0, len(self.columns)))
+        if "tensor" in self.kept and not self.last:
+            bits = np.int64(1) << order
+            return self.kept["tensor"][np.cumsum(bits) - bits, order]
         done = np.zeros((len(order), self.n), np.bool_)
         for k, a in enumerate(order[:-1]):
             done[k + 1 :, a] = True
@@ -109,7 +111,7 @@ class SequencingProblem:
 
     def cost_of(self, w: Array, order: Sequence[int]) -> float:
         """Cost of an order that may leave regions out."""
-        return float(self.check_weights(w) @ self.steps_of(order).sum(axis=0))
+        return float(self.check_weights(w) @ np.add.reduce(self.steps_of(order)))
 
     def feature_sum(self, sequence: Sequence[int]) -> Array:
         """Phi(xi), shape (n + m,): features added along the sequence."""

@@ -12,17 +12,17 @@ import numpy as np
 from app.errors import ContradictoryConstraints
 from app.geometry.tool import Array, region_letters
 from app.sequencing import kernels
-from app.sequencing.block import SMALLEST, Single
+from app.sequencing.answer import MOST_NODES, TOLERANCE, answer, lowest_cost
+from app.sequencing.block import SMALLEST
 from app.sequencing.constraints import Constraints, Resolved, listed, resolve
-from app.sequencing.exact import Limits, Model, costs_to_go, form_for, magnitude, model_for, why_not_exact
-from app.sequencing.forms import Form, step_costs
+from app.sequencing.exact import Limits, Model, costs_to_go, extra_costs, form_for, model_for, uses_threads, why_not_exact
+from app.sequencing.forms import Form
 from app.sequencing.large import best_found
 from app.sequencing.last import LAST_LIMIT, after_last, costs_to_go_by_last
-from app.sequencing.nearly import Nearly, explore
+from app.sequencing.nearly import Nearly
 from app.sequencing.problem import SequencingProblem
+from app.sequencing.rows import Single
 
-TOLERANCE = 1e-7  # relative: costs closer than this count as equal
-ROUNDING = 4e-6  # error of single-precision costs-to-go, as a share of the largest sum of absolute costs
 TIE_CAP = 2000  # equally cheap sequences that a tie-break looks at one by one
 LIMITS = Limits()
 
@@ -43,10 +43,11 @@ class Shortest:
 
     sequence: tuple[int, ...]  # finished regions first, skipped ones left out
     cost: float  # in float64 along the sequence
-    ties: int  # sequences of this cost, this one included; 1 when not proved
+    ties: int  # sequences of this cost, this one included
     proved: bool
     method: str  # plain words: what was done, and why
     bound: float = -np.inf  # no sequence costs less; the cost itself when proved, -inf when not looked for
+    counted: bool = True  # False: there may be more ties than `ties`
 
     @property
     def gap(self) -> float:
@@ -66,12 +67,19 @@ class Solution:
     """The exact costs-to-go of a problem under fixed weights, and the graph of its cheapest sequences."""
 
     model: Model
-    form: Form
+    w: Array  # of the columns that don't depend on the region before
     after: Array  # what depends on the region before (`last.after_last`)
     v: Single  # costs-to-go in single precision; empty for few regions
-    graph: Nearly  # all cheapest sequences, perhaps some more
+    graph: Nearly  # all cheapest sequences, perhaps some more; not all where it isn't complete
+    order: tuple[int, ...]  # the cheapest of lowest ids, as `named` takes it
+    ties: int  # cheapest sequences in the graph
     scale: float  # cost that relative tolerances refer to
     error: float  # of v
+
+    @property
+    def form(self) -> Form:
+        """The cost in one form."""
+        return form_for(self.model, self.w)
 
     @property
     def tolerance(self) -> float:
@@ -86,7 +94,7 @@ class Solution:
 def reason_against(problem: SequencingProblem, resolved: Resolved, limits: Limits = LIMITS) -> str | None:
     """Why the exact search is not used; None when it is."""
     n = len(resolved.free)
-    if (problem.last or resolved.never_next.any()) and n > LAST_LIMIT:
+    if (problem.last or resolved.parted) and n > LAST_LIMIT:
         return f"costs depend on the region before, and {n} regions are more than the {LAST_LIMIT} searched exactly then"
     return why_not_exact(problem, n, limits)
 
@@ -101,29 +109,17 @@ def solve(problem: SequencingProblem, w: Array, resolved: Resolved | None = None
         ContradictoryConstraints: No order avoids the forbidden neighbours.
     """
     w, resolved = problem.check_weights(w), resolved or resolve(None, problem.n)
-    model = model_for(problem, resolved)
-    form = form_for(model, w[: problem.width])
+    model, plain = model_for(problem, resolved), w[: problem.width].copy()  # writable: compiled code takes no other
     after = after_last(problem.last, w[problem.width :], resolved)
-    most = magnitude(form) + float(np.where(np.isfinite(after), np.abs(after), 0.0).sum())
-    v, error = np.zeros(0, np.float32), ROUNDING * most
-    limit = np.inf
-    if model.n >= SMALLEST:
+    v, filled = np.empty(1 << model.n if model.n >= SMALLEST else 0, np.float32), False
+    if len(v) and (len(after) or uses_threads(model.n)):
+        form, filled = form_for(model, plain), True
         v = costs_to_go_by_last(form, after) if len(after) else costs_to_go(model, form)
-        limit = lowest_cost(form, after, v) + error
-    graph = explore(form, v, after, limit)
-    if model.n and not (graph.complete and np.isfinite(graph.lowest)) and not (np.isfinite(limit) and not graph.complete):
+    a = answer(model.prepared, plain, extra_costs(model, plain), after, v, filled, MOST_NODES)
+    if model.n and a.to_go[0] == np.inf:
         raise ContradictoryConstraints(_forbidden(problem, resolved))
-    lowest = graph.lowest if graph.complete else limit - error
-    return Solution(model, form, after, v, graph, max(abs(lowest), 1e-3 * most, 1e-300), error)
-
-
-def lowest_cost(form: Form, after: Array, v: Single) -> float:
-    """Cheapest cost of a complete sequence, to single precision."""
-    n = form.start.shape[1]
-    first = np.empty(n)
-    step_costs(form, 0, first)
-    bits = np.int64(1) << np.arange(n)
-    return float((first + after[n] + v[bits * n + np.arange(n)]).min() if len(after) else (first + v[bits]).min())
+    graph = Nearly(a.first, a.region, a.cost, a.to, a.end, model.n, a.complete, a.to_go)
+    return Solution(model, plain, after, v, graph, tuple(a.order.tolist()), (int(a.high) << 64) + int(a.low), a.scale, a.error)
 
 
 def _forbidden(problem: SequencingProblem, resolved: Resolved) -> str:
@@ -146,7 +142,7 @@ def _forbidden(problem: SequencingProblem, resolved: Resolved) -> str:
             needed.remove(pair)
     letters = region_letters(problem.n)
     words = [f"{letters[b]} never directly after {letters[a]}" for a, b in needed]
-    also = " together with the precedence given" if resolved.before.any() else ""
+    also = " together with the precedence given" if resolved.ordered else ""
     return f"No order can have {listed(words)}{also}. Take one of these away."
 
 
@@ -182,47 +178,28 @@ def shortest_sequence(
     if against:
         sequence = best_found(problem, w, resolved)
         method = f"Best found: beam search, then exact re-ordering of short stretches. Not proved optimal: {against}."
-        return Shortest(sequence, problem.cost_of(w, sequence), 1, proved=False, method=method)
+        return Shortest(sequence, problem.cost_of(w, sequence), 1, proved=False, method=method, counted=False)
     solution = solve(problem, w, resolved)
-    n = solution.model.n
+    n, counted = solution.model.n, solution.graph.complete
     method = f"Exact: dynamic programming over all {1 << n:,} sets of finished regions{' and the last one' if len(solution.after) else ''}."
-    if not solution.graph.complete:
-        order, ties = _walk(solution), 1
-        method += " So many sequences nearly tie that they were not counted."
-    else:
-        ties = solution.graph.count(solution.tolerance)
-        order, more = _settle(solution, tie_break, ties)
-        method += more
+    if not counted:
+        method += f" At least {solution.ties:,} orders tie; so many nearly do that they were not all counted."
+    order, more = _settle(solution, tie_break)
     sequence = solution.named(order)
     cost = problem.cost_of(w, sequence)
-    return Shortest(sequence, cost, ties, proved=True, method=method, bound=cost)
+    return Shortest(sequence, cost, solution.ties, proved=True, method=method + more, bound=cost, counted=counted)
 
 
-def _settle(solution: Solution, tie_break: TieBreak | Ends | None, ties: int) -> tuple[tuple[int, ...], str]:
+def _settle(solution: Solution, tie_break: TieBreak | Ends | None) -> tuple[tuple[int, ...], str]:
     graph, tolerance, free = solution.graph, solution.tolerance, list(solution.model.resolved.free)
-    if not free:
-        return (), ""
+    if tie_break is None or not free:
+        return solution.order, ""
     if isinstance(tie_break, Ends):
         start = np.zeros(len(free)) if solution.model.resolved.done else tie_break.start[free]
         return graph.by_ends(start, tie_break.end[free], tolerance), ""
-    candidates = graph.members(tolerance, TIE_CAP if tie_break else 1)
-    if tie_break is None:
-        return candidates[0], ""
-    more = f" Ties settled among {len(candidates):,} of {ties:,} equal sequences." if ties > len(candidates) else ""
+    candidates = graph.members(tolerance, TIE_CAP)
+    more = f" Ties settled among {len(candidates):,} of {solution.ties:,} equal sequences." if solution.ties > len(candidates) else ""
     return min(candidates, key=lambda s: (tie_break(solution.named(s)), s)), more
-
-
-def _walk(solution: Solution) -> tuple[int, ...]:
-    """A cheapest sequence by the costs-to-go alone."""
-    n, state, order, costs = solution.model.n, 0, list[int](), np.empty(solution.model.n)
-    by_last = len(solution.after) > 0
-    for _ in range(n):
-        step_costs(solution.form, state, costs)
-        key = np.array([(state | 1 << a) * (n if by_last else 1) + (a if by_last else 0) for a in range(n)])
-        add = solution.after[order[-1] if order else n] if by_last else 0.0
-        order.append(int(np.argmin(costs + add + solution.v[key])))
-        state |= 1 << order[-1]
-    return tuple(order)
 
 
 @dataclass(frozen=True)
