@@ -2,10 +2,11 @@
 
 The cost is split into parts that are easy on their own, and each part is free to choose its own order:
 
-    pairs       what a region pays for each single region before it: each pair is ordered the cheaper way
-    walks       one per mean (curvature, height): an exact dynamic program over position and the sum so far, in which a region
-                may be met twice
+    walk        an exact dynamic program over position and the two sums behind the means; a region may be met twice, and a
+                step chooses which of its neighbours are finished (`relaxed_walk`)
+    pairs       every two regions that have to do with each other choose their positions
     sets        the gaps: for every number of finished regions the cheapest set in the cheapest pair of boxes
+    chain       where costs depend on the region before: the cheapest choice of a region for every position
 
 Their optima add up to a bound. Prices (Lagrange multipliers) make the parts agree: a region pays a price for being at a
 position in one part and gets it back in another, which changes no sequence's cost. Every choice of prices gives a valid
@@ -17,121 +18,108 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.geometry.tool import Array
-from app.sequencing.boxes import Boxes, boxes_of
 from app.sequencing.constraints import Resolved, resolve
 from app.sequencing.features import declare
-from app.sequencing.intervals import Interval, interval_of, product, weighted
-from app.sequencing.large import between_costs
+from app.sequencing.parts import Parts, split
 from app.sequencing.problem import SequencingProblem
-from app.sequencing.relaxations import cheapest_pairs
-from app.sequencing.structure import MeanStep, Pairwise
-from app.sequencing.walks import Walk, walks_of
+from app.sequencing.relaxations import cheapest_chain, cheapest_pairs
+from app.sequencing.relaxed_walk import Walk, cheapest_walk
+from app.sequencing.structure import Undeclared
 
-ROUNDING = 1e-9  # of the largest price or cost involved, per position: far more than float64 can lose
-STEPS = 400  # of the subgradient method
+ROUNDING = 1e-9  # of the sum of all numbers involved: far more than float64 can lose
+STEPS = 1000  # of the subgradient method
+COARSE, MIDDLE, FINE = 4000, 10_000, 30_000  # pairs of levels of the two sums: for most steps, for the rest, for the last bound
+REFINED = 0.25  # share of the steps with the middle tables
+PATIENCE = 25  # steps without gain before they are halved
+TINY = 1e-3  # steps this small end the search
+KEPT = 0.9  # share of the direction before that goes on
+EVEN = 10.0  # how much further prices of a pair go together at all positions than each for itself
 
-
-@dataclass(frozen=True)
-class Parts:
-    """The cost of an order of F free regions, split."""
-
-    fixed: Array  # (F, F) [position, region] paid in any case
-    change: Array  # (F, F) [a, b] what a pays when b is before it
-    before: NDArray[np.bool_]  # (F, F)
-    walks: tuple[Walk, ...]
-    boxes: Boxes | None
-    constant: float
+Report = Callable[[float], None]
 
 
 @dataclass
 class Prices:
-    """Lagrange multipliers: what a region pays in each part, which it gets back in the last walk."""
+    """Lagrange multipliers: what a region pays in one part, which it gets back in another."""
 
-    place: Array  # (F,) in the pairs, per region before it
-    member: Array  # (F,) in the sets, per set that holds it
+    bits: Array  # (E, 2, 2, P) in the walk [pair, side, other not yet or already finished, position], back in the pairs
+    member: Array  # (P, F) in the sets of a size, back in the walk at every position before
     visit: Array  # (F,) for being met at all; it is met once
-    walk: Array  # (T - 1, F, F) in every walk but the last, per position
+    chain: Array  # (P, F) in the chain, back in the walk
 
-    def of_last(self) -> Array:
-        """(F, F) what a region gets back at each position."""
-        count = len(self.place)
-        position = np.arange(count)[:, None]
-        return self.visit - self.place * position - self.member * (count - 1 - position) - self.walk.sum(axis=0)
+    def arrays(self) -> tuple[Array, Array, Array, Array]:
+        """All of them."""
+        return self.bits, self.member, self.visit, self.chain
 
+    def plus(self, factor: float, other: "Prices") -> "Prices":
+        """The sum with a multiple of others."""
+        return Prices(*(x + factor * y for x, y in zip(self.arrays(), other.arrays(), strict=True)))
 
-def split(problem: SequencingProblem, w: Array, resolved: Resolved) -> Parts:
-    """The parts of w . phi over the orders of the free regions."""
-    free, past, n = np.array(resolved.free, np.int64), np.array(resolved.done, np.int64), problem.n
-    count, count_columns = len(free), len(problem.features.columns)
-    columns, v = declare(problem.graph, problem.features), w[count_columns:]
-    known = [interval_of(d, free, past, n) for d in columns]
-    fixed, change = np.zeros((count, count)), np.zeros((count, count))
-    boxes = boxes_of(columns, w, free, past, n)
-    for i, d in enumerate(columns):
-        match d:
-            case Pairwise():
-                change += w[i] * d.change[np.ix_(free, free)]
-                start = d.start[free] + d.change[np.ix_(free, past)].sum(axis=1)
-                fixed += w[i] * start
-                fixed[0] += w[i] * (known[i].low[0] - start)
-            case MeanStep():
-                pass  # in a walk
-            case _ if boxes is not None and i in boxes.columns:
-                pass
-            case _:
-                fixed += weighted(w[i], known[i])
-    between, first = between_costs(problem, w)
-    way_in = between[np.ix_([*past[-1:], *free], free)]
-    np.fill_diagonal(way_in[len(way_in) - count :], np.inf)
-    fixed += np.minimum(way_in.min(axis=0), np.inf if len(past) else first[free])
-    walks, left = walks_of(problem, columns, w[:count_columns], v, known, free, past)
-    for j in left:
-        fixed += weighted(float(v[j]), product(*_factors(problem, known, j)))
-    before = resolved.before[np.ix_(free, free)]
-    return Parts(fixed, change, before, walks, boxes, 0.0)
+    def times(self, other: "Prices") -> float:
+        """The scalar product."""
+        return sum(float((x * y).sum()) for x, y in zip(self.arrays(), other.arrays(), strict=True))
+
+    def of_walk(self, parts: Parts) -> Array:
+        """(P, F) what a region pays in the walk at each position."""
+        paid = np.broadcast_to(self.visit, self.chain.shape) - (0.0 if parts.chain is None else self.chain)
+        if parts.boxes is not None and len(paid) > 2:
+            paid[:-2] -= np.cumsum(self.member[-2:0:-1], axis=0)[::-1]
+        return paid
+
+    def conditioned(self) -> "Prices":
+        """A direction in which each kind moves as far as pays off: members pay at every position, pairs mostly together."""
+        even = self.bits + EVEN * self.bits.mean(axis=3, keepdims=True)
+        return Prices(even, 0.2 * self.member, 3 * self.visit, 0.3 * self.chain)
 
 
-def _factors(problem: SequencingProblem, known: list[Interval], j: int) -> tuple[Interval, Interval]:
-    one, two = (problem.features.factors[key] for key in (problem.interactions[j].first, problem.interactions[j].second))
-    return sum_of([known[i] for i in one]), sum_of([known[i] for i in two])
-
-
-def sum_of(intervals: list[Interval]) -> Interval:
-    """The interval of a sum."""
-    total = intervals[0]
-    for interval in intervals[1:]:
-        total = total + interval
-    return total
+def no_prices(parts: Parts) -> Prices:
+    """Where the search begins."""
+    count = len(parts.first)
+    return Prices(np.zeros((len(parts.pairs.ends), 2, 2, count)), *(np.zeros(s) for s in ((count, count), count, (count, count))))
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What the parts cost and chose under given prices."""
+    """The bound under given prices, and where the parts disagree: a subgradient."""
 
     bound: float
-    place: Array  # (F,) regions before each, in the pairs
-    member: Array  # (F,) sets that hold each, in the sets
-    visits: Array  # (T, F, F) 1 where a walk meets a region at a position
+    slope: Prices
 
 
-def evaluate(parts: Parts, prices: Prices) -> Answer:
+def evaluate(parts: Parts, walk: Walk, prices: Prices) -> Answer:
     """The bound under some prices: valid whatever they are."""
-    count = len(parts.fixed)
-    place, visits = np.zeros(count), np.zeros((len(parts.walks), count, count))
-    bound = parts.constant + cheapest_pairs(parts.change, prices.place, parts.before, place) - prices.visit.sum()
-    member = prices.member * 0.0
+    slope = no_prices(parts)
+    met = np.zeros_like(prices.member)
+    bound = parts.pairs.constant - float(prices.visit.sum()) + _walk(parts, walk, prices, slope, met)
+    bound += cheapest_pairs(parts.pairs.ends, parts.pairs.change, prices.bits, parts.first, parts.last, slope.bits)
+    slope.visit = met.sum(axis=0) - 1
     if parts.boxes is not None:
-        value, member = parts.boxes.cheapest(prices.member)
+        value, held = parts.boxes.cheapest(prices.member)
         bound += value
-    paid = prices.of_last() + parts.fixed
-    for t, walk in enumerate(parts.walks):
-        value, regions = walk.cheapest(paid if t == len(parts.walks) - 1 else prices.walk[t])
-        bound += value
-        visits[t, np.arange(count), regions] = 1.0
-    return Answer(float(bound), place, member, visits)
+        slope.member[1:] = held[1:] - np.cumsum(met, axis=0)[:-1]
+        slope.member[-1] = 0.0
+    if parts.chain is not None:
+        regions = np.zeros(len(met), np.int64)
+        possible = np.where(np.isfinite(parts.steps.fixed), prices.chain, np.inf)
+        bound += cheapest_chain(possible, parts.chain.between, parts.chain.start, regions)
+        slope.chain = -met
+        slope.chain[np.arange(len(met)), regions] += 1
+    return Answer(float(bound), slope)
+
+
+def _walk(parts: Parts, walk: Walk, prices: Prices, slope: Prices, met: Array) -> float:
+    """The cheapest walk; fills which region is where and adds its choices to the slope."""
+    count, pairs = len(met), parts.pairs
+    regions, finished = np.zeros(count, np.int64), np.zeros((count, pairs.near.shape[1]), np.int64)
+    value = np.empty((count + 1, walk.one.shape[2], walk.two.shape[2]))
+    cost = cheapest_walk(walk, prices.of_walk(parts), prices.bits, value, regions, finished)
+    met[np.arange(count), regions] = 1
+    here = pairs.near[regions] >= 0
+    at = np.broadcast_to(np.arange(count)[:, None], here.shape)[here]
+    np.add.at(slope.bits, (pairs.pair[regions][here], pairs.side[regions][here], finished[here], at), 1)
+    return cost
 
 
 def lower_bound(
@@ -141,6 +129,7 @@ def lower_bound(
     resolved: Resolved | None = None,
     steps: int = STEPS,
     should_stop: Callable[[], bool] = lambda: False,
+    report: Report = lambda _bound: None,
 ) -> float:
     """A cost that no sequence goes below.
 
@@ -151,81 +140,79 @@ def lower_bound(
         resolved: Constraints; the bound is for what comes after the finished regions.
         steps: Subgradient steps, each a new set of prices.
         should_stop: Asked after every step.
+        report: Told every better bound.
 
     Returns:
         The best bound met, never above `best`; -inf when a feature declares nothing that could bound it.
     """
-    w = problem.check_weights(w)
-    r = resolved or resolve(None, problem.n)
-    parts = split(problem, w, r)
-    bound, scale = ascend(parts, best, steps, should_stop)
-    return min(best, bound - ROUNDING * scale)
+    w, r = problem.check_weights(w), resolved or resolve(None, problem.n)
+    if _unknown(problem, w):
+        return -np.inf
+    if not r.free:
+        return min(best, 0.0)
+    ascent = Ascent(split(problem, w, r), best, report)
+    for cells, share in ((COARSE, 1 - REFINED), (MIDDLE, REFINED)):
+        if ascent.climb(cells, max(1, round(share * steps)), should_stop):
+            break
+    ascent.try_out(FINE)
+    return min(best, ascent.bound)
 
 
-def ascend(parts: Parts, best: float, steps: int, should_stop: Callable[[], bool]) -> tuple[float, float]:
-    """The best bound met and the size of the numbers it was made of.
+def _unknown(problem: SequencingProblem, w: Array) -> bool:
+    """Whether something counts of which nothing is known but its values."""
+    columns, factors = declare(problem.graph, problem.features), problem.features.factors
+    counted = {i for i in range(len(columns)) if w[i]}
+    for j, i in enumerate(problem.interactions):
+        counted |= {*factors[i.first], *factors[i.second]} if w[len(columns) + j] else set()
+    return any(isinstance(columns[i], Undeclared) for i in counted)
+
+
+class Ascent:
+    """The search for good prices.
 
     A step goes along the averaged subgradient, as far as would close the gap to `best` if the bound were linear, times a
     factor that halves whenever nothing has helped for a while.
     """
-    count = len(parts.fixed)
-    prices = Prices(np.zeros(count), np.zeros(count), np.zeros(count), np.zeros((max(len(parts.walks) - 1, 0), count, count)))
-    kept, bound, scale, far, idle = prices, -np.inf, 0.0, 1.0, 0
-    direction: Prices | None = None
-    for _ in range(steps):
-        answer = evaluate(parts, prices)
-        if answer.bound > bound + 1e-4 * abs(best - bound):
-            idle = 0
-        else:
-            idle += 1
-        if answer.bound > bound:
-            bound, kept, scale = answer.bound, prices, _size(parts, prices)
-        if bound >= best or not np.isfinite(answer.bound) or should_stop():
-            break
-        if idle > 15:
-            far, idle, prices, direction = far / 2, 0, kept, None
-            answer = evaluate(parts, prices)
-        direction = _blend(direction, slope_of(parts, prices, answer))
-        norm = sum(float((x * x).sum()) * f for x, f in zip(_arrays(direction), _reach(count), strict=True))
-        if norm == 0 or far < 1e-3:
-            break
-        step = far * (best - answer.bound) / norm
-        prices = Prices(*(x + step * f * y for x, y, f in zip(_arrays(prices), _arrays(direction), _reach(count), strict=True)))
-    return bound, scale
 
+    def __init__(self, parts: Parts, best: float, report: Report) -> None:
+        self.parts, self.best, self.report = parts, best, report
+        self.prices = self.kept = no_prices(parts)
+        self.bound, self.far = -np.inf, 1.0
 
-def slope_of(parts: Parts, prices: Prices, answer: Answer) -> Prices:
-    """A subgradient of the bound: where the parts disagree."""
-    last = answer.visits[-1]
-    count = len(last)
-    position = np.arange(count)[:, None]
-    met = last.sum(axis=0)
-    held = (last * (count - 1 - position)).sum(axis=0)
-    return Prices(
-        answer.place - (last * position).sum(axis=0),
-        answer.member - held if parts.boxes is not None else np.zeros(count),
-        met - 1,
-        answer.visits[:-1] - last,
-    )
+    def climb(self, cells: int, steps: int, should_stop: Callable[[], bool]) -> bool:
+        """Take steps with tables of a size; True when there is nothing left to do."""
+        walk = self.parts.steps.walk(self.parts.pairs, cells)
+        direction: Prices | None = None
+        idle, highest = 0, -np.inf
+        for _ in range(steps):
+            answer = evaluate(self.parts, walk, self.prices)
+            idle = 0 if answer.bound > highest + 1e-4 * abs(self.best - highest) else idle + 1
+            if answer.bound > highest:
+                highest, self.kept = answer.bound, self.prices
+                self._met(answer.bound, self.prices)
+            if self.bound >= self.best or not np.isfinite(answer.bound) or should_stop():
+                return True
+            if idle > PATIENCE:
+                self.far, idle, self.prices, direction = self.far / 2, 0, self.kept, None
+                answer = evaluate(self.parts, walk, self.prices)
+            direction = answer.slope if direction is None else answer.slope.plus(KEPT, direction)
+            way = direction.conditioned()
+            norm = direction.times(way)
+            if norm <= 0 or self.far < TINY:
+                break
+            self.prices = self.prices.plus(self.far * (self.best - answer.bound) / norm, way)
+        self.prices = self.kept
+        return False
 
+    def try_out(self, cells: int) -> None:
+        """The bound of the best prices with tables of a size."""
+        if np.isfinite(self.bound) and self.bound < self.best:
+            self._met(evaluate(self.parts, self.parts.steps.walk(self.parts.pairs, cells), self.kept).bound, self.kept)
 
-def _blend(old: Prices | None, new: Prices) -> Prices:
-    if old is None:
-        return new
-    return Prices(*(y + 0.7 * x for x, y in zip(_arrays(old), _arrays(new), strict=True)))
-
-
-def _arrays(prices: Prices) -> tuple[Array, Array, Array, Array]:
-    return prices.place, prices.member, prices.visit, prices.walk
-
-
-def _reach(count: int) -> tuple[float, float, float, float]:
-    """How far each kind of price moves along its slope, which is longer where positions or sets are counted."""
-    return 0.3 / count**2, 0.3 / count**2, 1.0, 1.0
-
-
-def _size(parts: Parts, prices: Prices) -> float:
-    """What rounding is relative to: the sum of everything that was added."""
-    count = len(parts.fixed)
-    sums = [float(np.abs(x).sum()) for x in (parts.change, prices.visit, prices.place * count, prices.member * count)]
-    return count * float(np.abs(parts.fixed).max(initial=0) + np.abs(prices.walk).max(initial=0)) + sum(sums)
+    def _met(self, bound: float, prices: Prices) -> None:
+        """Keep a bound, lowered by more than rounding can have raised it."""
+        fixed = self.parts.steps.fixed
+        size = float(np.abs(fixed[np.isfinite(fixed)]).sum()) + sum(float(np.abs(x).sum()) for x in prices.arrays())
+        if bound - ROUNDING * size > self.bound:
+            self.bound = bound - ROUNDING * size
+            self.report(min(self.bound, self.best))

@@ -23,26 +23,21 @@ class Boxes:
     """Pairs of boxes, around what is finished and around the rest."""
 
     columns: tuple[int, ...]  # features that are covered
-    weights: Array  # (2,) of the gap inside and of the gap left
     area: Array  # (F,) of the free regions
-    fixed: NDArray[np.int64]  # (Q, F) 1 must be finished, -1 must not, 0 free
-    areas: Array  # (Q, 2) of the boxes
-    total: float  # area of all regions
-    done_area: float
-    small: Array  # (3, F) exact cost with none, with one and with all but one of the free regions finished
+    fixed: NDArray[np.int8]  # (Q, F) 1 must be finished, -1 must not, 0 free
+    boxes: Array  # (Q, 4) how many must be, how many are free, the gap cost of those that must, what an area adds to it
+    small: Array  # (F,) exact cost of the sets of one free region
+    last: NDArray[np.int64]  # (F,) pair that each size chose before, a hint
 
     def cheapest(self, price: Array) -> tuple[float, Array]:
-        """Least cost over all sizes 0 .. F - 1 when a member pays `price` (F,), and in how many of the sets each is."""
+        """Least cost over the sizes 1 .. F - 2 when a member of the set of a size pays `price` (F, F), and the sets (F, F)."""
         count = len(price)
-        low, chosen = np.full(count + 1, np.inf), np.zeros((count + 1, count), np.bool_)
-        base = np.array([self.done_area, 0.0])
-        cheapest_sets(price, self.area, self.fixed, self.areas, self.weights, self.total, base, low, chosen)
-        for size, cost in ((count - 1, self.small[2] + price.sum() - price), (1, self.small[1] + price), (0, self.small[0])):
-            a = int(np.argmin(cost))
-            if size < count:
-                low[size] = cost[a]
-                chosen[size] = {0: np.zeros(count, np.bool_), 1: np.arange(count) == a}.get(size, np.arange(count) != a)
-        return float(low[:count].sum()), chosen[:count].sum(axis=0).astype(np.float64)
+        low, chosen = np.full(count, np.inf), np.zeros((count, count), np.bool_)
+        cheapest_sets(price, self.area, self.fixed, self.boxes, self.last, low, chosen)
+        if count > 2:
+            a = int(np.argmin(self.small + price[1]))
+            low[1], chosen[1, a] = self.small[a] + price[1, a], True
+        return float(low[1 : count - 1].sum()), chosen.astype(np.float64)
 
 
 def boxes_of(columns: tuple[Declaration, ...], w: Array, free: NDArray[np.int64], past: NDArray[np.int64], n: int) -> Boxes | None:
@@ -63,32 +58,27 @@ def boxes_of(columns: tuple[Declaration, ...], w: Array, free: NDArray[np.int64]
     inside, rest = inside[:, free], rest[:, free]
     covered = (~inside).astype(np.float32) @ (~rest).astype(np.float32).T == 0
     first, second = np.nonzero(covered)
-    fixed = np.where(~inside[first], -1, np.where(~rest[second], 1, 0))
-    pairs = np.stack([inside_area[first], rest_area[second]], axis=1)
-    small = np.stack([_exact(gaps, w, sets, past, n) for sets in _small_sets(free, past, n)])
-    return Boxes(tuple(gaps), weights, one.area[free].copy(), fixed, pairs, float(one.area.sum()), float(one.area[past].sum()), small)
-
-
-def _small_sets(free: NDArray[np.int64], past: NDArray[np.int64], n: int) -> list[NDArray[np.bool_]]:
-    """(F, N) sets: none, one, all but one of the free regions on top of what was finished before."""
-    base = np.zeros((len(free), n), np.bool_)
-    base[:, past] = True
-    single, but_one = base.copy(), base.copy()
+    fixed = np.where(~inside[first], -1, np.where(~rest[second], 1, 0)).astype(np.int8)
+    boxes = _costs(
+        fixed, one.area[free], weights, inside_area[first], rest_area[second], float(one.area.sum()), float(one.area[past].sum())
+    )
+    single = np.zeros((len(free), n), np.bool_)
+    single[:, past] = True
     single[np.arange(len(free)), free] = True
-    but_one[:, free] = True
-    but_one[np.arange(len(free)), free] = False
-    return [base, single, but_one]
+    small = _exact(gaps, w, single)
+    return Boxes(tuple(gaps), one.area[free].copy(), fixed, boxes, small, np.zeros(len(free), np.int64))
 
 
-def _exact(gaps: dict[int, Gap], w: Array, sets: NDArray[np.bool_], past: NDArray[np.int64], n: int) -> Array:
-    total = np.zeros(len(sets))
-    nothing = ~sets.any(axis=1)
-    for i, d in gaps.items():
-        value = d.of_sets(sets)
-        if d.empty is not None:
-            value = np.where(nothing, d.empty.min(), value)
-        total += w[i] * value
-    return total
+def _costs(fixed: NDArray[np.int8], area: Array, weights: Array, inside: Array, rest: Array, total: float, done: float) -> Array:
+    """How many must be in the set, how many are free, the gap cost of those that must, and what each area adds, (Q, 4)."""
+    held = done + (fixed == 1) @ area
+    one, two = (np.divide(w, a, out=np.zeros_like(a), where=a > 0) for w, a in zip(weights, (inside, rest), strict=True))
+    cost = np.where(inside > 0, weights[0], 0.0) - one * held + np.where(rest > 0, weights[1], 0.0) - two * (total - held)
+    return np.stack([(fixed == 1).sum(axis=1), (fixed == 0).sum(axis=1), cost, two - one], axis=1)
+
+
+def _exact(gaps: dict[int, Gap], w: Array, sets: NDArray[np.bool_]) -> Array:
+    return sum((w[i] * d.of_sets(sets) for i, d in gaps.items()), np.zeros(len(sets)))
 
 
 def _boxes(d: Gap, most: int) -> tuple[NDArray[np.bool_], Array]:

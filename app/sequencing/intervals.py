@@ -44,6 +44,14 @@ def _times(x: Array, y: Array) -> Array:
     return np.where(np.isnan(out), 0.0, out)  # 0 times infinite: what is 0 stays 0
 
 
+def sum_of(intervals: list[Interval]) -> Interval:
+    """The interval of a sum."""
+    total = intervals[0]
+    for interval in intervals[1:]:
+        total = total + interval
+    return total
+
+
 def mean_step(d: MeanStep, own: Array, static: Array, mean: Interval) -> Interval:
     """Values of a mean step when the mean lies in an interval."""
     near, far = own - mean.high, own - mean.low

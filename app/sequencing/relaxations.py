@@ -1,7 +1,10 @@
-"""The three relaxed problems behind `bounds`, compiled: positions with a tracked mean, sets in boxes, and pairs.
+"""The relaxed problems behind `bounds` besides the walk, compiled: pairs of regions, sets in boxes, and chains of neighbours.
 
 Each takes prices (Lagrange multipliers) and returns its lowest value with what it chose; any prices give a valid bound.
 """
+
+# pyright: reportArgumentType=false, reportPossiblyUnboundVariable=false
+# Compiled code: the checker takes elements of arrays for arrays.
 
 import numba as nb
 import numpy as np
@@ -9,115 +12,117 @@ from numpy.typing import NDArray
 
 from app.geometry.tool import Array
 
+Ints = NDArray[np.int64]
+
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
-def cheapest_walk(table: Array, price: Array, step: NDArray[np.int64], start: int, end: int) -> tuple[float, NDArray[np.int64]]:
-    """The cheapest walk that makes one step per position and ends where the sum of all steps ends.
+def cheapest_pairs(ends: Ints, change: Array, bits: Array, first: Ints, last: Ints, chosen: Array) -> float:
+    """The least sum over pairs when each pair chooses its two positions for itself.
 
     Args:
-        table: Cost of region a at position p with the tracked sum at level l, (P, F, L); inf where that can't be.
-        price: Added to every step, (P, F).
-        step: What region a adds to the level, (F,).
-        start: Level before the first step.
-        end: Level after the last.
-
-    Returns:
-        The walk's cost and the region at each position; regions may repeat.
+        ends: The two regions of each pair, (E, 2).
+        change: What either pays when it comes second, (E, 2); inf where it must not.
+        bits: What a region gets at a position for the other not yet (0) or already (1) being finished, (E, 2, 2, P).
+        first: First position a region can have, (F,).
+        last: And the last.
+        chosen: Filled in: -1 at what each pair chose, zeros on entry, (E, 2, 2, P).
     """
-    positions, count, levels = table.shape
-    value, came = np.full((positions + 1, levels), np.inf), np.zeros((positions, levels), np.int64)
-    value[0, start] = 0.0
-    for p in range(positions):
+    total = 0.0
+    for e in range(len(ends)):
+        best, late, early, second = np.inf, 0, 0, 0
+        for s in range(2):
+            a, b, low, at = ends[e, s], ends[e, 1 - s], np.inf, 0
+            for p in range(bits.shape[3]):
+                if low < np.inf and first[a] <= p <= last[a]:
+                    x = low - bits[e, s, 1, p] + change[e, s]
+                    if x < best:
+                        best, late, early, second = x, p, at, s
+                if first[b] <= p <= last[b] and -bits[e, 1 - s, 0, p] < low:
+                    low, at = -bits[e, 1 - s, 0, p], p
+        total += best
+        chosen[e, second, 1, late] -= 1
+        chosen[e, 1 - second, 0, early] -= 1
+    return total
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def cheapest_chain(price: Array, between: Array, start: Array, regions: Ints) -> float:
+    """The cheapest choice of a region for every position when only neighbours in the order count.
+
+    Args:
+        price: Of a region at a position, (P, F); inf where it can't be.
+        between: Of a region directly after another, (F, F) [before, after]; inf where it must not follow.
+        start: Of a region as the first, (F,).
+        regions: Filled in, (P,).
+    """
+    count = len(price)
+    value, came = np.full((count, count), np.inf), np.zeros((count, count), np.int64)
+    value[0] = start + price[0]
+    for p in range(1, count):
         for a in range(count):
-            k, x = step[a], price[p, a]
-            lo, hi = max(0, -k), min(levels, levels - k)
-            for level in range(lo, hi):
-                y = value[p, level] + table[p, a, level] + x
-                if y < value[p + 1, level + k]:
-                    value[p + 1, level + k] = y
-                    came[p, level + k] = a
-    walk, level = np.zeros(positions, np.int64), end
-    if value[positions, end] == np.inf:
-        return np.inf, walk
-    for p in range(positions - 1, -1, -1):
-        walk[p] = came[p, level]
-        level -= step[walk[p]]
-    return value[positions, end], walk
+            for b in range(count):
+                x = value[p - 1, b] + between[b, a] + price[p, a]
+                if x < value[p, a]:
+                    value[p, a], came[p, a] = x, b
+    a = int(np.argmin(value[count - 1]))
+    total = value[count - 1, a]
+    for p in range(count - 1, -1, -1):
+        regions[p] = a
+        a = came[p, a]
+    return total
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
 def cheapest_sets(
-    price: Array,
-    area: Array,
-    fixed: NDArray[np.int64],
-    pairs: Array,
-    weights: Array,
-    total: float,
-    base: Array,
-    low: Array,
-    chosen: NDArray[np.bool_],
+    price: Array, area: Array, fixed: NDArray[np.int8], boxes: Array, last: Ints, low: Array, chosen: NDArray[np.bool_]
 ) -> None:
-    """For every size, the least gap cost plus prices of a set of free regions within a pair of boxes.
+    """For the sizes 2 .. F - 2, the least gap cost plus prices of a set of free regions within a pair of boxes.
 
     Args:
-        price: Paid for each region in the set, (F,).
+        price: Paid for each region in the set of a size, (F, F) [size, region].
         area: Areas of the free regions, (F,).
         fixed: Per pair of boxes and region 0 free, 1 must be in the set, -1 must not, (Q, F).
-        pairs: Areas of the box around the set and around the rest, (Q, 2).
-        weights: Of the gap inside the set and of the gap left.
-        total: Area of all regions.
-        base: Area and number of regions that are in every set, those already finished, (2,).
-        low: Filled in: least value per size 0 .. F, (F + 1,); inf on entry.
-        chosen: Filled in: the set of that value, (F + 1, F).
+        boxes: Per pair how many must be in the set, how many are free, the gap cost of those that must, and what each area
+            in the set adds, (Q, 4).
+        last: The pair each size chose before, (F,): looked at first.
+        low: Filled in: least value per size, (F,); inf on entry.
+        chosen: Filled in: the set of that value, (F, F).
     """
-    count = len(price)
-    key, order = np.empty(count), np.empty(count, np.int64)
-    for q in range(len(pairs)):
-        one, two = pairs[q, 0], pairs[q, 1]
-        slope = (-weights[0] / one if one > 0 else 0.0) + (weights[1] / two if two > 0 else 0.0)
-        inside = base[0]
-        value, size, free = 0.0, 0, 0
-        for a in range(count):
-            if fixed[q, a] == 1:
-                value += price[a]
-                inside += area[a]
-                size += 1
-            elif fixed[q, a] == 0:
-                key[free], order[free] = price[a] + slope * area[a], a
-                free += 1
-        value += (weights[0] * (1 - inside / one) if one > 0 else 0.0) + (weights[1] * (1 - (total - inside) / two) if two > 0 else 0.0)
-        ranked = np.argsort(key[:free])
-        for i in range(free + 1):
-            if value < low[size + i]:
-                low[size + i] = value
-                for a in range(count):
-                    chosen[size + i, a] = fixed[q, a] == 1
-                for j in range(i):
-                    chosen[size + i, order[ranked[j]]] = True
-            if i < free:
-                value += key[ranked[i]]
-    return
+    count = len(area)
+    key, region = np.empty(count + 1), np.empty(count + 1, np.int64)
+    small, large = area.min(), area.max()
+    for size in range(2, count - 1):
+        order = np.argsort(price[size])
+        prices = price[size][order][:size].sum()  # no set of this size costs less
+        for turn in range(-1, len(boxes)):
+            q = last[size] if turn < 0 else turn
+            need, slope = size - int(boxes[q, 0]), boxes[q, 3]
+            if need < 0 or need > boxes[q, 1]:
+                continue
+            if boxes[q, 2] + prices + need * min(slope * small, slope * large) >= low[size]:
+                continue
+            value = boxes[q, 2] + _fill(price[size], area, fixed[q], slope, need, order, key, region)
+            if value < low[size]:
+                low[size], last[size] = value, q
+                chosen[size] = fixed[q] == 1
+                for i in range(need):
+                    chosen[size, region[i]] = True
 
 
 @nb.njit(cache=True, nogil=True, error_model="numpy")
-def cheapest_pairs(change: Array, slope: Array, before: NDArray[np.bool_], place: Array) -> float:
-    """The least sum over pairs when each pair is ordered for itself; a region pays `slope` per region before it.
-
-    `change[a, b]` is what a pays when b is before it; `place` (F,) is filled with how many were put before each.
-    """
-    n, total = len(slope), 0.0
-    place[:] = 0
-    for a in range(n):
-        for b in range(a):
-            late, early = change[a, b] + slope[a], change[b, a] + slope[b]  # b before a, a before b
-            if before[b, a] or (not before[a, b] and late < early):
-                total += late
-                place[a] += 1
-            elif late == early and not before[a, b]:
-                total += late
-                place[a] += 0.5
-                place[b] += 0.5
-            else:
-                total += early
-                place[b] += 1
-    return total
+def _fill(price: Array, area: Array, fixed: NDArray[np.int8], slope: float, need: int, order: Ints, key: Array, region: Ints) -> float:
+    """Prices of the regions that must be in a set, and of the `need` cheapest free ones, which `region` then starts with."""
+    held, value = 0, 0.0
+    for a in order:
+        if fixed[a] == 1:
+            value += price[a]
+        elif fixed[a] == 0:
+            x, j = price[a] + slope * area[a], min(held, need)
+            while j > 0 and key[j - 1] > x:
+                key[j], region[j] = key[j - 1], region[j - 1]
+                j -= 1
+            key[j], region[j] = x, a
+            held += 1
+    for i in range(need):
+        value += key[i]
+    return value

@@ -1,133 +1,202 @@
-"""Relaxed sequences that know the sum behind one mean exactly (up to a rounding that is accounted for) and the rest roughly."""
+"""The tables of the relaxed sequence (`relaxed_walk`): what is known of a step from its position and two rounded sums."""
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.geometry.tool import Array
-from app.sequencing.intervals import Interval, chosen_sums, mean_step, product, weighted
-from app.sequencing.problem import SequencingProblem
-from app.sequencing.relaxations import cheapest_walk
-from app.sequencing.structure import Declaration, MeanStep
+from app.sequencing.intervals import Interval, chosen_sums, mean_step, product, sum_of, weighted
+from app.sequencing.pairs import Pairs
+from app.sequencing.relaxations import Ints
+from app.sequencing.relaxed_walk import Walk
+from app.sequencing.structure import MeanStep
 
-LEVELS = 320  # values of the tracked sum, about
+TRACKED = 2  # means
+UNITS = 120  # roundings that are tried
+LOCAL = 10  # levels of the second sum that one level of the first costs as much as
 
 
 @dataclass(frozen=True)
-class Walk:
-    """A dynamic program over position and the level of a sum."""
+class Tracked:
+    """A mean over the finished regions, and the columns that compare regions with it."""
 
-    table: Array  # (F, F, L) least cost of region a at position p with the sum at a level
-    step: NDArray[np.int64]  # (F,) what region a adds to the level
-    start: int
-    end: int
+    averaged: Array  # (F,)
+    total: float  # over the regions finished before
+    steps: dict[int, tuple[float, MeanStep]]  # column -> weight and declaration, for the free regions
 
-    def cheapest(self, price: Array) -> tuple[float, NDArray[np.int64]]:
-        """The cheapest walk under prices (F, F), and the region at each position."""
-        return cheapest_walk(self.table, np.ascontiguousarray(price), self.step, self.start, self.end)
+    @property
+    def importance(self) -> float:
+        """How much a wrong mean costs, per unit."""
+        return sum(abs(w) * (abs(d.rise) + abs(d.fall)) for w, d in self.steps.values()) + 1e-9
+
+
+@dataclass(frozen=True)
+class Product:
+    """Weight times the product of two sums of columns."""
+
+    weight: float
+    one: tuple[int, ...]
+    two: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Steps:
+    """What the steps of F free regions cost besides what other relaxed problems pay."""
+
+    fixed: Array  # (F, F) [position, region]
+    count: int  # regions finished before
+    tracked: tuple[Tracked, Tracked]
+    known: list[Interval]  # of every column, (F, F)
+    products: tuple[Product, ...]  # between and within the tracked means
+    local: Product | None  # of the first mean's columns and columns linear in what is finished
+    start: Array  # (F,) those columns with nothing finished
+    pull: Array  # (F, F) [a, b] and what b adds to them for a
+
+    def walk(self, pairs: Pairs, cells: int) -> Walk:
+        """The tables with about `cells` pairs of levels."""
+        return _Tables(self, cells).walk(pairs)
 
 
 @dataclass(frozen=True)
 class Grid:
-    """The tracked sum as whole steps of a unit: sum = middle * p + unit * level + error."""
+    """A sum as whole steps of a unit: sum = middle * p + unit * level + error."""
 
     unit: float
     middle: float
-    step: NDArray[np.int64]  # (F,)
+    step: Ints  # (F,)
     error: Interval  # (F + 1,) of the sum of p regions
 
     @property
-    def start(self) -> int:
-        """Levels start here, so that none is negative."""
-        return int(-np.minimum(self.step, 0).sum())
+    def reach(self) -> Interval:
+        """Lowest and highest level after p regions, (F + 1,)."""
+        return chosen_sums(self.step.astype(np.float64))
 
     @property
     def levels(self) -> int:
-        return int(np.abs(self.step).sum()) + 1
+        reach = self.reach
+        return int(reach.high.max() - reach.low.min()) + 1
 
 
-def grid_of(values: Array) -> Grid:
-    """Units so that there are about LEVELS levels and rounding hurts least."""
-    middle = float(values.mean())
-    off = values - middle
-    spread = float(np.abs(off).sum())
-    if spread <= 1e-12 * max(1.0, float(np.abs(values).sum())):
-        return Grid(1.0, middle, np.zeros(len(values), np.int64), chosen_sums(off))
-    units = spread / LEVELS * np.linspace(1.0, 1.6, 61)
-    errors = [float(np.abs(off - u * np.round(off / u)).sum()) for u in units]
-    unit = float(units[int(np.argmin(errors))])
-    step = np.round(off / unit).astype(np.int64)
-    return Grid(unit, middle, step, chosen_sums(off - unit * step))
+@dataclass(frozen=True)
+class Roundings:
+    """Ways to round a sum: units and middles, how many levels they make and how far the sum may be off."""
+
+    unit: Array  # (C,)
+    middle: Array  # (C,)
+    levels: Ints  # (C,)
+    off: Array  # (C,)
+
+    def grid(self, i: int, values: Array) -> Grid:
+        """The i-th way, carried out."""
+        apart = values - self.middle[i]
+        step = np.round(apart / self.unit[i]).astype(np.int64)
+        return Grid(float(self.unit[i]), float(self.middle[i]), step, chosen_sums(apart - self.unit[i] * step))
 
 
-def walks_of(
-    problem: SequencingProblem,
-    columns: tuple[Declaration, ...],
-    w: Array,
-    v: Array,
-    known: list[Interval],
-    free: NDArray[np.int64],
-    past: NDArray[np.int64],
-) -> tuple[tuple[Walk, ...], list[int]]:
-    """One walk per mean that costs anything (at least one), and the interactions that no walk holds."""
-    factors = [[problem.features.factors[key] for key in (i.first, i.second)] for i in problem.interactions]
-    means: list[Array] = []
-    of: dict[int, int] = {}  # column -> mean
-    for i, d in enumerate(columns):
-        if isinstance(d, MeanStep):
-            at = next((t for t, m in enumerate(means) if np.array_equal(m, d.averaged)), len(means))
-            means += [d.averaged] * (at == len(means))
-            of[i] = at
-    held: dict[int, list[int]] = {t: [] for t in range(len(means))}
-    left: list[int] = []
-    for j, pair in enumerate(factors):
-        within = [of[i] for side in pair for i in side if i in of]
-        (held[min(within)] if within else left).append(j)
-    walks = [
-        _walk(columns, {i: w[i] for i in of if of[i] == t}, [(v[j], factors[j]) for j in held[t]], known, mean, free, past)
-        for t, mean in enumerate(means)
-    ]
-    count = len(free)
-    plain = Walk(np.zeros((count, count, 1)), np.zeros(count, np.int64), 0, 0)
-    return tuple(walks) or (plain,), left
+def roundings_of(values: Array, most: int) -> Roundings:
+    """Roundings with up to about `most` levels, coarse to fine; the first has one level."""
+    middles = np.unique([values.mean(), np.median(values), values.min()])
+    size = np.abs(values - middles[:, None]).sum(axis=1)
+    parts = np.unique(np.round(np.geomspace(2, max(2 * most, 3), UNITS), 1))
+    unit = np.maximum(size[:, None] / parts, 1e-300)
+    unit[:, 0] = 4 * (np.ptp(values) + 1e-300)
+    unit, middle = unit.ravel(), np.repeat(middles, len(parts))
+    apart = values - middle[:, None]
+    step = np.round(apart / unit[:, None])
+    off, reach = chosen_sums(apart - unit[:, None] * step), chosen_sums(step)
+    levels = (reach.high.max(axis=1) - reach.low.min(axis=1)).astype(np.int64) + 1
+    return Roundings(unit, middle, levels, (off.high - off.low).max(axis=1))
 
 
-def _walk(
-    columns: tuple[Declaration, ...],
-    weights: dict[int, float],
-    products: list[tuple[float, list[tuple[int, ...]]]],
-    known: list[Interval],
-    averaged: Array,
-    free: NDArray[np.int64],
-    past: NDArray[np.int64],
-) -> Walk:
-    grid, count = grid_of(averaged[free]), len(free)
-    level = np.arange(grid.levels) - grid.start
-    position = np.arange(count)
-    size = np.maximum(position + len(past), 1)[:, None, None]
-    exact = averaged[past].sum() + grid.middle * position[:, None, None] + grid.unit * level
-    error = [x[:count, None, None] for x in (grid.error.low, grid.error.high)]
-    mean = Interval((exact + error[0]) / size, (exact + error[1]) / size)
-    wide = {i: Interval(x.low[..., None], x.high[..., None]) for i, x in enumerate(known)}
-    for i in weights:
-        d = columns[i]
-        assert isinstance(d, MeanStep)
-        narrow = mean_step(d, d.own[free][:, None], d.static[free][:, None], mean)
-        low, high = np.array(narrow.low), np.array(narrow.high)
-        low[0], high[0] = wide[i].low[0], wide[i].high[0]
-        wide[i] = Interval(low, high)
-    table = np.zeros((count, count, grid.levels))
-    for i, weight in weights.items():
-        table += weighted(weight, wide[i])
-    for weight, sides in products:
-        one, two = (_total([wide[i] for i in side]) for side in sides)
-        table += weighted(weight, product(one, two))
-    return Walk(table, grid.step, grid.start, grid.start + int(grid.step.sum()))
+def best_grids(tracked: tuple[Tracked, Tracked], cells: int) -> tuple[Grid, Grid]:
+    """The two roundings that hurt least together."""
+    one, two = (roundings_of(t.averaged, cells) for t in tracked)
+    size = one.levels[:, None] * (two.levels + LOCAL)
+    harm = tracked[0].importance * one.off[:, None] + tracked[1].importance * two.off
+    loss = np.where(size <= max(cells, size.min()), harm + 1e-12 * size, np.inf)
+    i, j = np.unravel_index(int(loss.argmin()), loss.shape)
+    return one.grid(int(i), tracked[0].averaged), two.grid(int(j), tracked[1].averaged)
 
 
-def _total(intervals: list[Interval]) -> Interval:
-    total = intervals[0]
-    for interval in intervals[1:]:
-        total = total + interval
-    return total
+class _Tables:
+    """One rounding of the two sums, and the columns as far as it knows them."""
+
+    def __init__(self, steps: Steps, cells: int) -> None:
+        self.steps, self.count = steps, len(steps.fixed)
+        self.grids = best_grids(steps.tracked, cells)
+        self.wide: dict[int, Interval] = {}
+        for t, grid in zip(steps.tracked, self.grids, strict=True):
+            mean = self._mean(t, grid)
+            for i, (_, d) in t.steps.items():
+                self.wide[i] = mean_step(d, d.own[:, None], d.static[:, None], mean)
+
+    def _mean(self, t: Tracked, grid: Grid) -> Interval:
+        position = np.arange(self.count)[:, None, None]
+        level = np.arange(grid.levels) + int(grid.reach.low.min())
+        exact = t.total + grid.middle * position + grid.unit * level
+        low, high = (x[: self.count, None, None] for x in (grid.error.low, grid.error.high))
+        size = np.maximum(position + self.steps.count, 1)
+        return Interval((exact + low) / size, (exact + high) / size)
+
+    def walk(self, pairs: Pairs) -> Walk:
+        steps, count = self.steps, self.count
+        tables = [np.zeros((count, count, g.levels)) for g in self.grids]
+        for t, table in zip(steps.tracked, tables, strict=True):
+            for i, (weight, _) in t.steps.items():
+                table += weighted(weight, self.wide[i])
+        terms: list[list[tuple[Array, Array]]] = []
+        for p in steps.products:
+            at = self._means(p)
+            if at == {0, 1}:
+                terms.append(self._term(p))
+            else:
+                tables[at.pop()] += weighted(p.weight, product(self._factor(p.one), self._factor(p.two)))
+        left, right = self._terms(terms)
+        weight, pull = self._around(pairs)
+        reach = [g.reach for g in self.grids]
+        return Walk(
+            steps.fixed, tables[0], tables[1], left, right, self._ends(), weight, pull, pairs.near, pairs.pair, pairs.side, pairs.kind,
+            pairs.touch, pairs.reached, np.stack([g.step for g in self.grids]),
+            np.stack([np.round(r.low).astype(np.int64) for r in reach]), np.stack([np.round(r.high).astype(np.int64) for r in reach]),
+        )  # fmt: skip
+
+    def _means(self, p: Product) -> set[int]:
+        return {t for t in range(TRACKED) for i in (*p.one, *p.two) if i in self.steps.tracked[t].steps}
+
+    def _factor(self, columns: tuple[int, ...]) -> Interval:
+        known = self.steps.known
+        return sum_of([self.wide[i] if i in self.wide else Interval(known[i].low[..., None], known[i].high[..., None]) for i in columns])
+
+    def _term(self, p: Product) -> list[tuple[Array, Array]]:
+        """Products of which the least is a lower bound: one where no factor is negative, else all corners."""
+        first = p.one if p.one[0] in self.steps.tracked[0].steps else p.two
+        one, two = self._factor(first), self._factor(p.two if first is p.one else p.one)
+        corners = [(p.weight * x, y) for x in (one.low, one.high) for y in (two.low, two.high)]
+        if one.low[1:].min(initial=0) >= 0 and two.low[1:].min(initial=0) >= 0:
+            return [corners[0 if p.weight > 0 else 3]] * len(corners)
+        return corners
+
+    def _terms(self, terms: list[list[tuple[Array, Array]]]) -> tuple[Array, Array]:
+        if not terms:
+            nothing = [np.zeros((1, 1, self.count, self.count, g.levels)) for g in self.grids]
+            return nothing[0], nothing[1]
+        kept = 1 if all(x is term[0] for term in terms for x in term) else len(terms[0])
+        return np.array([[x for x, _ in term[:kept]] for term in terms]), np.array([[y for _, y in term[:kept]] for term in terms])
+
+    def _ends(self) -> Array:
+        """Values of the local product's first factor that bound it from below."""
+        p = self.steps.local
+        if p is None:
+            return np.zeros((1, self.count, self.count, self.grids[0].levels))
+        factor, other = self._factor(p.one), sum_of([self.steps.known[i] for i in p.two])
+        paid = Interval(*sorted((p.weight * other.low, p.weight * other.high), key=lambda x: x.sum()))
+        if paid.low.min() >= 0:
+            return factor.low[None].copy()
+        if paid.high.max() <= 0:
+            return factor.high[None].copy()
+        return np.stack([factor.low, factor.high])
+
+    def _around(self, pairs: Pairs) -> tuple[Array, Array]:
+        weight = 0.0 if self.steps.local is None else self.steps.local.weight
+        rows = np.arange(self.count)[:, None]
+        return weight * self.steps.start, np.where(pairs.near >= 0, weight * self.steps.pull[rows, pairs.near], 0.0)
