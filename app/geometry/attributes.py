@@ -6,12 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.geometry.compiled import kernel
-from app.geometry.fitting import CYLINDER, KINDS, NORMAL_WEIGHT, SIZE, SPHERE, fit, sums_about
+from app.geometry.fitting import AREA, CYLINDER, KINDS, NORMAL_WEIGHT, SPHERE, fit, sums_about
+from app.geometry.quadrics import CONE, fit_cone, fit_quadric
 from app.geometry.tool import Array, Mesh
 
-# RMS cost of a primitive / size of the region above which it is called free-form: facets of true primitives stay under
+# RMS cost of a primitive / size of the region above which it is called something else: facets of true primitives stay under
 # 2e-4, a doubly curved patch (Hood's crown, radii 0.20 m and 0.53 m) reaches 3.5e-3, a plane with its fillet 8e-3
 PRIMITIVE_ERROR = 0.002
+BETTER = 0.25  # share of the cost of plane, sphere and cylinder below which a cone explains what one of them explains too
 FLAT_TURN = np.radians(3)  # a region whose primitive bends less than this over its size counts as a plane
 NO_TURN = 1e-6  # rad; a free-form region that turns less on average (both ways alike) has no curvature, whatever the rounding
 
@@ -25,7 +27,7 @@ class Attributes:
     centroid: Array  # (n, 3) m
     normal: Array  # (n, 3) unit, area mean
     curvature: Array  # (n,) signed dominant principal curvature, 1/m, + convex
-    kind: tuple[str, ...]  # "plane" | "cylinder" | "sphere" | "freeform"
+    kind: tuple[str, ...]  # "plane" | "cylinder" | "cone" | "sphere" | "curved" (one general quadric) | "freeform"
     low: Array  # (n, 3) lower corner of the box, m
     high: Array  # (n, 3) upper corner of the box, m
 
@@ -70,21 +72,33 @@ def region_boxes(vertices, faces, labels, n):  # pragma: no cover - compiled
 def region_shape(mesh: Mesh, faces: NDArray[np.int64]) -> tuple[float, str]:
     """Signed dominant curvature (1/m) and kind of one region.
 
-    Paper: curvature comes from the fitted primitive, 1/r; where none fits, from how the normals turn over the region.
+    Paper: curvature comes from the fitted primitive, 1/r (of a cone: at its mean square distance to the axis); where none fits,
+    from how the normals turn over the region.
     """
     chosen = mesh.faces[faces]
     low, high = (box[0] for box in region_boxes(mesh.vertices, chosen, np.zeros(len(chosen), np.int32), 1))
     scale = float(np.linalg.norm(high - low))
     sums = sums_about(mesh.vertices, chosen, (low + high) / 2, scale)
-    out = np.empty(5)
-    cost = float(fit(sums, NORMAL_WEIGHT, out))
-    kind = int(out[0])
-    if np.sqrt(cost / sums[SIZE - 1]) <= PRIMITIVE_ERROR:
-        if kind in (SPHERE, CYLINDER) and abs(out[1]) < FLAT_TURN:
-            return 0.0, "plane"
-        return float(out[1]) / scale, KINDS[kind]
+    kind, curvature = _primitive(sums)
+    if kind in ("plane", "cylinder", "cone", "sphere"):
+        return curvature / scale, kind
     bend = turning_curvature(mesh.vertices[chosen])
-    return (bend if abs(bend) * scale > NO_TURN else 0.0), "freeform"
+    return (bend if abs(bend) * scale > NO_TURN else 0.0), kind
+
+
+def _primitive(sums: Array) -> tuple[str, float]:
+    """Kind and signed curvature (in the sums' own unit; 0 for quadrics) of what describes them, the simplest first."""
+    out, other = np.empty(5), np.empty(5)
+    allowed = PRIMITIVE_ERROR**2 * sums[AREA]
+    cost, cone = float(fit(sums, NORMAL_WEIGHT, out)), float(fit_cone(sums, NORMAL_WEIGHT, other))
+    if cone <= allowed and cone < BETTER * cost:
+        out[0], out[1] = CONE, other[1]
+    elif cost > allowed:
+        return ("curved" if fit_quadric(sums, NORMAL_WEIGHT, np.empty(10)) <= allowed else "freeform"), 0.0
+    kind = int(out[0])
+    if kind in (SPHERE, CYLINDER, CONE) and abs(out[1]) < FLAT_TURN:
+        return "plane", 0.0
+    return KINDS[kind], float(out[1])
 
 
 def turning_curvature(corners: Array) -> float:

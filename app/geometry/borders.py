@@ -12,6 +12,7 @@ from app.geometry.cleaning import edge_table
 from app.geometry.tool import Array, Mesh
 
 Integers = NDArray[np.int64]
+MANY = 1000  # points from which it pays to drop those inside before their hull is found
 FREE = -1  # beyond a free border
 FACING, ASIDE = np.cos(np.radians(30)), np.cos(np.radians(60))  # two edges lie opposite within 30 degrees, not at all beyond 60
 
@@ -24,6 +25,8 @@ class Borders:
     beyond: Integers  # (B,) region on the other side, FREE without one
     ends: Integers  # (B, 2) vertices, as the region's own triangle lists them: the region lies to the left
     length: Array  # (B,) metres
+    face: Integers  # (B,) the region's own triangle
+    beyond_face: Integers  # (B,) the triangle on the other side, FREE without one
 
     def shared(self, n: int) -> Array:
         """Length of the border between regions (n, n), metres."""
@@ -39,21 +42,24 @@ class Borders:
 
 def find_borders(mesh: Mesh, labels: NDArray[np.int32]) -> Borders:
     """Edges where the region changes, the working surface ends, or the mesh isn't a surface (1 or more than 2 faces)."""
-    edges, side_edge, count = edge_table(mesh.faces.astype(np.int64))
+    edges, side_edge, count = edge_table(mesh.faces)
     flat = side_edge.ravel()
     owner = np.repeat(labels.astype(np.int64), 3)
     order = np.argsort(flat, kind="stable")
     start = np.concatenate([[0], np.cumsum(count)[:-1]])
-    beyond = np.full(len(flat), FREE)
+    beyond, beyond_side = np.full(len(flat), FREE), np.full(len(flat), FREE)
     two = np.flatnonzero(count == 2)
     first, second = order[start[two]], order[start[two] + 1]
     beyond[first], beyond[second] = owner[second], owner[first]
-    crowded = _inside_crowded(edges, flat, owner, count)
-    listed = (owner >= 0) & (beyond != owner) & ~crowded
-    faces = mesh.faces.astype(np.int64)
-    ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)[listed]
+    beyond_side[first], beyond_side[second] = second, first
+    listed = (owner >= 0) & (beyond != owner)
+    if (count > 2).any():
+        listed &= ~_inside_crowded(edges, flat, owner, count)
+    face, side = np.divmod(np.flatnonzero(listed), 3)
+    ends = np.stack([mesh.faces[face, side], mesh.faces[face, (side + 1) % 3]], axis=1).astype(np.int64)
     length = np.linalg.norm(mesh.vertices[ends[:, 0]] - mesh.vertices[ends[:, 1]], axis=1)
-    return Borders(owner[listed], beyond[listed], ends, length)
+    # a triangle has three sides; FREE // 3 stays FREE
+    return Borders(owner[listed], beyond[listed], ends, length, np.flatnonzero(listed) // 3, beyond_side[listed] // 3)
 
 
 def _inside_crowded(edges: Integers, flat: Integers, owner: Integers, count: Integers) -> NDArray[np.bool_]:
@@ -123,8 +129,19 @@ def _outer_loop(ends: Integers, length: Array) -> NDArray[np.bool_]:
     return loop[at[:, 0]] == np.argmax(np.bincount(loop[at[:, 0]], weights=length))
 
 
+def _outside(points: Array) -> Array:
+    """Points that may lie on the convex hull: not inside the polygon of those that are farthest out in some directions."""
+    at = np.linspace(0, 2 * np.pi, 16, endpoint=False)
+    farthest = points[np.argmax(points @ np.stack([np.cos(at), np.sin(at)]), axis=0)]
+    way = np.roll(farthest, -1, axis=0) - farthest
+    left = np.stack([-way[:, 1], way[:, 0]])
+    inside = (points @ left > np.einsum("ik,ki->k", left, farthest) + 1e-12 * np.abs(left).sum()).all(axis=1)
+    return points[~inside] if (np.linalg.norm(way, axis=1) > 0).all() else points
+
+
 def smallest_rectangle(points: Array) -> Array:
     """Axes (2, 2) of the rectangle with the smallest area around the points; one side lies on the hull."""
+    points = _outside(points) if len(points) > MANY else points
     try:
         hull = points[ConvexHull(points).vertices]
     except QhullError:  # all points on one line

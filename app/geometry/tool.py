@@ -55,7 +55,7 @@ class Region:
     normal: Array  # (3,) unit, area mean
     area: float  # m^2
     curvature: float  # signed dominant principal curvature, 1/m (tables: as listed)
-    kind: str  # "plane" | "cylinder" | "sphere" | "freeform" | "listed"
+    kind: str  # "plane" | "cylinder" | "cone" | "sphere" | "curved" (one general quadric) | "freeform" | "listed"
 
 
 @dataclass(frozen=True)

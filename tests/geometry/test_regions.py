@@ -157,15 +157,15 @@ def test_sample_moulds_have_the_radii_they_are_built_with(name: str, region: str
     assert curvature == pytest.approx(true, rel=0.02)
 
 
-def test_doubly_curved_regions_are_free_form_and_keep_the_larger_curvature() -> None:
+def test_doubly_curved_regions_are_quadrics_and_keep_the_larger_curvature() -> None:
     """Saddle: -60 degrees over 0.38 m across, +70 degrees over 0.46 m along. Hood: 70 degrees over 0.24 m is the larger."""
     across, along = np.radians(60) / 0.38, np.radians(70) / 0.46
     for kind, curvature in curvatures("Saddle").values():
-        assert kind == "freeform"
+        assert kind == "curved"
         assert 0.9 * min(across, along) < abs(curvature) < max(across, along)
     assert curvatures("Saddle")["Hollow, rear middle"][1] < 0 < curvatures("Saddle")["Rear slope, middle"][1]
     for place in ("rear", "rear middle", "front middle", "front"):
-        assert curvatures("Hood")[f"Crown, {place} right"] == ("freeform", pytest.approx(np.radians(70) / 0.24, rel=0.05))
+        assert curvatures("Hood")[f"Crown, {place} right"] == ("curved", pytest.approx(np.radians(70) / 0.24, rel=0.05))
 
 
 MOTIONS = ((0.0, (1.0, -2.0, 0.5)), (np.pi / 2, (0.3, 0.1, -4.0)), (0.4, (0.0, 0.0, 0.0)))

@@ -1,0 +1,89 @@
+"""Which way a region looks where it meets another: its flat main face, the cylinder, cone or sphere it is, else its triangles."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.geometry.round_shapes import ROUND, Round, fit_round
+from app.geometry.tool import Array, Mesh, Tool
+
+NEAR_FLAT = np.radians(10)  # triangles within this of the median normal belong to the flat face
+EXACTLY = np.radians(1)  # the same for what looks round as a whole: a large flat face with its fillet is nearly a large cylinder
+MOSTLY = 0.6  # share of the area from which a region with something bent at its edge counts as a flat face
+FEW, SURELY = 500, 0.4  # triangles looked at first, and the share of them below which the region isn't mostly flat
+ROUNDS, SETTLED = 60, 1e-10
+
+
+@dataclass(frozen=True)
+class MainFaces:
+    """Normals of regions at their borders."""
+
+    triangle: Array  # (F, 3) unit normals of all triangles
+    flat: Array  # (n, 3) unit normal of the flat main face, nan where there is none
+    round: tuple[Round | None, ...]  # the cylinder, cone or sphere that a region is
+
+    def at(self, region: NDArray[np.int64], face: NDArray[np.int64], points: Array) -> Array:
+        """Unit normals (K, 3) of regions at points on their triangles."""
+        normals = np.where(np.isnan(self.flat[region]), self.triangle[face], self.flat[region])
+        for k, shape in enumerate(self.round):
+            mine = region == k
+            if shape is not None and mine.any():
+                normals[mine] = shape.normals(points[mine])
+        return normals
+
+
+def find_main_faces(tool: Tool) -> MainFaces:
+    """The main faces of all regions of a tool on a mesh."""
+    cross = _crosses(tool.mesh)
+    twice = np.linalg.norm(cross, axis=1)
+    unit = cross / np.maximum(twice, 1e-300)[:, None]
+    flat, shapes = np.full((tool.n, 3), np.nan), []
+    order = np.argsort(tool.labels, kind="stable")
+    ends = np.searchsorted(tool.labels[order], np.arange(tool.n + 1))
+    for a, region in enumerate(tool.regions):
+        mine = order[ends[a] : ends[a + 1]]
+        main = flat_face(region.kind, unit[mine], twice[mine])
+        if main is not None:
+            flat[a] = main
+        fitted = main is None and region.kind in ROUND
+        shapes.append(fit_round(region.kind, tool.mesh, tool.mesh.faces[mine]) if fitted else None)
+    return MainFaces(unit, flat, tuple(shapes))
+
+
+def flat_face(kind: str, normals: Array, weight: Array) -> Array | None:
+    """Unit normal of the flat face that most of a region of a kind is; None where it bends all over.
+
+    It is the geometric median of the triangles' normals: what is bent at the edge of a flat face doesn't move it.
+    """
+    limit = np.cos(EXACTLY if kind in ROUND else NEAR_FLAT)
+    step = -(-len(normals) // FEW)
+    few = _median(normals[::step], weight[::step])  # enough to see that a region bends
+    if few is None or weight[::step][normals[::step] @ few > limit].sum() < SURELY * weight[::step].sum():
+        return None
+    median = _median(normals, weight) if step > 1 else few
+    return None if median is None or weight[normals @ median > limit].sum() < MOSTLY * weight.sum() else median
+
+
+def _median(normals: Array, weight: Array) -> Array | None:
+    """Geometric median of unit vectors, itself one; None where they look all ways alike."""
+    median = weight @ normals
+    if np.linalg.norm(median) <= 1e-6 * weight.sum():
+        return None
+    median /= np.linalg.norm(median)
+    for _ in range(ROUNDS):
+        away = normals - median
+        pull = weight / np.maximum(np.sqrt(np.einsum("ij,ij->i", away, away)), 1e-9)
+        step = pull @ normals
+        step /= np.linalg.norm(step)
+        moved = np.linalg.norm(step - median)
+        median = step
+        if moved < SETTLED:
+            break
+    return median
+
+
+def _crosses(mesh: Mesh) -> Array:
+    """Normals (F, 3) of the triangles, twice their area long."""
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+    return np.cross(b - a, c - a)
