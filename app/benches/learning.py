@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from app.benches.effort_figures import effort_figures
 from app.benches.figures import Figure, Options
 from app.benches.studies import demonstrations
 from app.benches.teaching import SYNTHETIC_TRUTH, Taught, made_up_truths, teach
@@ -42,6 +43,7 @@ def measure(options: Options) -> Iterator[Figure]:
     yield from _made_up(synthetic, seeds)
     yield from _real(options.data, options.quick)
     yield from _speed(synthetic)
+    yield from effort_figures(synthetic)
 
 
 def _synthetic(shown: Shown) -> Iterator[Figure]:

@@ -97,7 +97,9 @@ def ablation_plot(found: Ablation, quantity: str) -> Plot:
     """One of Fig. 4's three plots."""
     title, label = QUANTITIES[quantity]
     x = np.arange(found.updates + 1.0)
-    curves = tuple(Curve(name, x, b[quantity].mean, b[quantity].low, b[quantity].high) for name, b in found.bands.items())
+    curves = tuple(  # none of the quantities can be negative, whatever the interval around its mean says
+        Curve(name, x, b[quantity].mean, np.maximum(b[quantity].low, 0.0), b[quantity].high) for name, b in found.bands.items()
+    )
     return Plot(title, "Update", label, curves)
 
 
@@ -118,10 +120,10 @@ def effort(data: Path, out: Path | None, say: Say) -> None:
     found = study_effort(trained, unseen, np.ones(len(trained[0].problem.columns)))
     say("Preferred side, learned on the training tools: tools whose chosen order has the least effort, before -> after learning")
     say("(tools on which the preference makes no difference are left out)")
-    say("preference      answers   training tools   unseen tools")
+    say("preference           answers   training tools   unseen tools")
     for r in found:
         seen, new = (f"{t.before} -> {t.after} of {t.tools}" for t in (r.trained, r.unseen))
-        say(f"{r.preference:14s}  {r.answers:7d}   {seen:>14s}   {new:>12s}")
+        say(f"{r.preference:19s}  {r.answers:7d}   {seen:>14s}   {new:>12s}")
     _save(out, "effort.json", found)
     save_report(out, "effort", "Before and after a preferred side is learned", data, [effort_table(found)])
     shares = {at: np.array([100 * _share(r, at) for r in found]) for at in ("before", "after")}

@@ -20,15 +20,17 @@ from scipy.optimize import linprog
 
 from app.errors import EmptySample
 from app.learning.effort_choice import candidates
-from app.learning.effort_features import EFFORT_COLUMNS, effort_features, effort_penalty
+from app.learning.effort_features import ALL_COLUMNS, EFFORT_COLUMNS, all_effort_features, effort_features, effort_penalty
 from app.learning.performance_state import LearningDemonstration
 from app.learning.qp import Array, QuadraticProgram, solve
 from app.learning.questions import PreferenceQuestion, Sequence, differing_regions, fingerprint
 from app.sequencing.classes import equivalent_sequences
+from app.sequencing.problem import SequencingProblem
 
 __all__ = ["EFFORT_WORDS", "EffortParameters", "EffortState", "EffortStepResult", "effort_penalty", "effort_step", "start_effort"]
 
 SAME = 1e-9  # places this close are the same
+MOST_CHOICES = 24  # sequences per tool that are compared
 NOISE = 1e-4  # weights this small against the largest are what the solver leaves of zero
 
 Demonstrations = list[LearningDemonstration]
@@ -45,6 +47,20 @@ class EffortParameters:
     most: int = 12  # questions asked at all
     cap: int = 256  # equivalent sequences looked at per tool
     pooled: bool = False  # as printed: one threshold for all tools, instead of comparing within a tool
+    travel: bool = False  # z holds the mean way between regions too
+    side_changes: bool = False  # and how often the side changes
+
+    @property
+    def width(self) -> int:
+        """Columns of z."""
+        return len(ALL_COLUMNS) if self.travel or self.side_changes else len(EFFORT_COLUMNS)
+
+    def features(self, problem: SequencingProblem, sequence: Sequence) -> Array:
+        """z of a sequence, (width,); what is switched off is 0."""
+        if self.width == len(EFFORT_COLUMNS):
+            return effort_features(problem, sequence)
+        counts = np.r_[np.ones(len(EFFORT_COLUMNS)), float(self.travel), float(self.side_changes)]
+        return all_effort_features(problem, sequence) * counts
 
 
 EFFORT_WORDS: dict[str, tuple[str, str]] = {
@@ -53,6 +69,8 @@ EFFORT_WORDS: dict[str, tuple[str, str]] = {
     "batch": ("B", "Questions asked at a time"),
     "most": ("Q", "Questions asked at most"),
     "cap": ("|Ω|", "Equivalent orders looked at per tool"),
+    "travel": ("z_9", "Long ways between regions are an effort too"),
+    "side_changes": ("z_10", "Changes between left and right are an effort too"),
 }
 
 
@@ -63,7 +81,7 @@ class EffortState:
     seed: int
     weights: tuple[float, ...]  # performance weights the run builds on, (n + m,)
     choices: tuple[tuple[Sequence, ...], ...]  # per demonstration: equivalent sequences, one per distinct z, the demonstrated one first
-    complete: bool  # every equivalent sequence of every tool was looked at
+    complete: bool  # whatever equivalent sequences of every tool can be to the effort was looked at
     asked: tuple[PreferenceQuestion, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
@@ -95,7 +113,7 @@ class EffortStepResult:
     state: EffortState
     outcome: str  # "questions" | "converged" | "infeasible"
     questions: tuple[PreferenceQuestion, ...]  # those without an answer
-    effort_weights: Array  # (8,) >= 0; of contradicting answers the soft-margin compromise
+    effort_weights: Array  # (8,) or (10,) >= 0; of contradicting answers the soft-margin compromise
     message: str
     conflicts: tuple[str, ...] = ()  # fingerprints of a smallest set of answers that exclude each other
 
@@ -107,16 +125,27 @@ def start_effort(demonstrations: Demonstrations, weights: Array, parameters: Eff
     choices, complete = [], True
     for d in demonstrations:
         omega = equivalent_sequences(d.problem, d.sequence, parameters.cap)
-        complete = complete and omega.complete
+        complete = complete and (omega.complete or (omega.every_end and parameters.width == len(EFFORT_COLUMNS)))
         own: list[Sequence] = [tuple(d.sequence)]
-        places = [effort_features(d.problem, d.sequence)]
+        places = [parameters.features(d.problem, d.sequence)]
         for candidate in omega.sequences:
-            z = effort_features(d.problem, candidate)
-            if all(np.abs(z - known).max() > SAME for known in places):
+            z = parameters.features(d.problem, candidate)
+            if (np.abs(np.array(places) - z).max(axis=1) > SAME).all():
                 own.append(candidate)
                 places.append(z)
-        choices.append(tuple(own))
+        choices.append(tuple(own[k] for k in _spread(np.array(places))))
     return EffortState(seed, tuple(float(x) for x in weights), tuple(choices), complete)
+
+
+def _spread(places: Array) -> list[int]:
+    """The first of the rows, then those farthest from all before, at most `MOST_CHOICES`."""
+    if len(places) <= MOST_CHOICES:
+        return list(range(len(places)))
+    kept, away = [0], np.linalg.norm(places - places[0], axis=1)
+    while len(kept) < MOST_CHOICES:
+        kept.append(int(away.argmax()))
+        away = np.minimum(away, np.linalg.norm(places - places[kept[-1]], axis=1))
+    return sorted(kept)
 
 
 def effort_step(demonstrations: Demonstrations, parameters: EffortParameters, state: EffortState, answers: Answers) -> EffortStepResult:
@@ -131,7 +160,7 @@ def effort_step(demonstrations: Demonstrations, parameters: EffortParameters, st
     Returns:
         New state, questions or effort weights, and the answers that contradict each other.
     """
-    known = [_Answered.of(demonstrations, q, answers[q.fingerprint]) for q in state.asked if q.fingerprint in answers]
+    known = [_Answered.of(demonstrations, parameters, q, answers[q.fingerprint]) for q in state.asked if q.fingerprint in answers]
     weights = _fit_answers(known, parameters)
     unanswered = tuple(q for q in state.asked if q.fingerprint not in answers)
     if unanswered:
@@ -152,14 +181,14 @@ class _Answered:
     """One answer as a row: z of the right sequence minus z of the left one."""
 
     fingerprint: str
-    difference: Array  # (8,)
+    difference: Array  # (width,)
     value: str
-    left: Array  # (8,) z of the left sequence
+    left: Array  # (width,) z of the left sequence
 
     @staticmethod
-    def of(demonstrations: Demonstrations, question: PreferenceQuestion, value: str) -> "_Answered":
+    def of(demonstrations: Demonstrations, parameters: EffortParameters, question: PreferenceQuestion, value: str) -> "_Answered":
         problem = demonstrations[question.demonstration].problem
-        left, right = effort_features(problem, question.left), effort_features(problem, question.right)
+        left, right = parameters.features(problem, question.left), parameters.features(problem, question.right)
         return _Answered(question.fingerprint, right - left, value, left)
 
     @property
@@ -170,7 +199,7 @@ class _Answered:
 
 def _fit(known: list[_Answered], parameters: EffortParameters) -> Array:
     """Soft-margin weights (Eq. 8): min lambda/2 |w|^2 + sum slack, w >= 0."""
-    wide = len(EFFORT_COLUMNS)
+    wide = parameters.width
     strict = [a.towards for a in known if a.towards is not None]
     if not strict:
         return np.zeros(wide)
@@ -193,15 +222,15 @@ def _clean(weights: Array) -> Array:
 
 
 def fit_pooled(preferred: Array, others: Array, parameters: EffortParameters) -> Array:
-    """Eq. 8 as printed: every preferred sequence (p, 8) of any tool at most t, every other one (q, 8) at least t + margin.
+    """Eq. 8 as printed: every preferred sequence (p, width) of any tool at most t, every other one (q, width) at least t + margin.
 
     min lambda/2 |w|^2 + sum slack over the others, w >= 0, t free.
 
     Paper: this compares sequences of different tools, which no expert was asked to do; `EffortParameters.pooled` turns it on.
     """
     if not len(others):
-        return np.zeros(len(EFFORT_COLUMNS))
-    wide, p, q = len(EFFORT_COLUMNS), len(preferred), len(others)
+        return np.zeros(others.shape[1])
+    wide, p, q = others.shape[1], len(preferred), len(others)
     rows = np.zeros((p + 2 * q + wide, wide + 1 + q))
     rows[:p, :wide], rows[:p, wide] = preferred, -1.0
     rows[p : p + q, :wide], rows[p : p + q, wide], rows[p : p + q, wide + 1 :] = -others, 1.0, -np.eye(q)
@@ -219,7 +248,7 @@ def _fit_answers(known: list[_Answered], parameters: EffortParameters) -> Array:
     sides = [
         (a.left, a.left + a.difference) if a.value == "left" else (a.left + a.difference, a.left) for a in known if a.towards is not None
     ]
-    wide = len(EFFORT_COLUMNS)
+    wide = parameters.width
     better, worse = (np.array([pair[k] for pair in sides]).reshape(-1, wide) for k in (0, 1))
     return fit_pooled(better, worse, parameters)
 
@@ -230,7 +259,7 @@ def _possible(known: list[_Answered]) -> bool:
     if not strict:
         return True
     level = [a.difference for a in known if a.value == "equal"]
-    wide = len(EFFORT_COLUMNS)
+    wide = len(strict[0])
     result = linprog(
         np.zeros(wide),
         A_ub=-np.array(strict),
@@ -260,7 +289,7 @@ def _next_questions(
 ) -> tuple[PreferenceQuestion, ...]:
     """The pairs of equivalent sequences the answers so far leave most open, at most one per direction."""
     room = min(parameters.batch, parameters.most - len(state.asked))
-    places = [np.array([effort_features(d.problem, s) for s in own]) for d, own in zip(demonstrations, state.choices, strict=True)]
+    places = [np.array([parameters.features(d.problem, s) for s in own]) for d, own in zip(demonstrations, state.choices, strict=True)]
     strict = [a.towards for a in known if a.towards is not None]
     level = [a.difference for a in known if a.value == "equal"]
     found = candidates(places, strict, level, [a.difference for a in known], state.seed + len(state.asked))
@@ -269,17 +298,18 @@ def _next_questions(
 
 def _question(i: int, left: Sequence, right: Sequence) -> PreferenceQuestion:
     where = [text for text, a, b in (("starts", left[0], right[0]), ("ends", left[-1], right[-1])) if a != b]
-    why = f"Both orders are equally good; the other one {' and '.join(where)} elsewhere."
+    other = f"{' and '.join(where)} elsewhere" if where else "goes another way between the same start and end"
+    why = f"Both orders are equally good; the other one {other}."
     return PreferenceQuestion(i, left, right, why, differing_regions(left, right), fingerprint("preference", i, left, right))
 
 
 def _closing(state: EffortState, known: list[_Answered]) -> str:
     if all(len(own) == 1 for own in state.choices):
-        return "No recorded order has an equally good one that starts or ends elsewhere: there is no effort to learn."
+        return "No recorded order has an equally good one that differs in what counts as effort: there is no effort to learn."
     if not any(a.value in ("left", "right") for a in known):
         return "No order was preferred to another, so effort does not count."
     note = "" if state.complete else " Some tools have more equally good orders than were looked at."
-    return f"The start and end of least effort follow from {_count(len(known), 'answer')}.{note}"
+    return f"The order of least effort follows from {_count(len(known), 'answer')}.{note}"
 
 
 def _count(number: int, noun: str) -> str:

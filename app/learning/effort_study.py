@@ -1,15 +1,15 @@
-"""Fig. 5: before and after an expert says where they like to start and end.
+"""Fig. 5: before and after an expert says where they like to start and end, or that short ways or few changes of side matter.
 
 All equivalent sequences of a tool cost the same; which one is done is settled by region names until an effort penalty is learned.
 A scripted expert prefers one side; the penalty is learned on the training tools and judged on tools it has not seen.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from app.learning.effort import EffortParameters, effort_step, start_effort
-from app.learning.effort_features import EFFORT_COLUMNS, effort_penalty
+from app.learning.effort_features import ALL_COLUMNS, EFFORT_COLUMNS, effort_penalty
 from app.learning.expert import ScriptedExpert
 from app.learning.performance_state import LearningDemonstration
 from app.learning.qp import Array
@@ -17,6 +17,7 @@ from app.sequencing.classes import CAP, optimal_sequences
 from app.sequencing.shortest import shortest_sequence
 
 LIKED = {"right": "left", "left": "right", "back": "front", "front": "back"}  # far right is an effort for who starts on the left
+MORE = {"travel": "short ways", "side_changes": "few changes of side"}  # with the columns that can be switched on
 SAME = 1e-9
 
 
@@ -42,7 +43,7 @@ class Tally:
 def study_effort(
     trained: list[LearningDemonstration], unseen: list[LearningDemonstration], weights: Array, parameters: EffortParameters | None = None
 ) -> list[SideResult]:
-    """Every side, at the start and at the end.
+    """Every side, at the start and at the end; then short ways and few changes of side, with both columns switched on.
 
     Args:
         trained: Tools the expert answers about.
@@ -54,16 +55,20 @@ def study_effort(
         the expert's own penalty.
     """
     parameters = parameters or EffortParameters()
-    return [_side(k, trained, unseen, weights, parameters) for k in range(len(EFFORT_COLUMNS))]
+    more = replace(parameters, travel=True, side_changes=True)
+    widths = range(len(ALL_COLUMNS))
+    return [_side(k, trained, unseen, weights, parameters if k < len(EFFORT_COLUMNS) else more) for k in widths]
 
 
 def _side(
     k: int, trained: list[LearningDemonstration], unseen: list[LearningDemonstration], weights: Array, parameters: EffortParameters
 ) -> SideResult:
-    end, side = EFFORT_COLUMNS[k][0].split("_")
-    expert = ScriptedExpert(weights, np.eye(len(EFFORT_COLUMNS))[k])
+    key = ALL_COLUMNS[k][0]
+    end, _, side = key.partition("_")
+    preference = MORE[key] if key in MORE else f"{end}s {LIKED[side]}"
+    expert = ScriptedExpert(weights, np.eye(parameters.width)[k])
     learned, answers = _taught(trained, expert, weights, parameters)
-    return SideResult(f"{end}s {LIKED[side]}", answers, *(_tally(part, weights, learned, expert) for part in (trained, unseen)))
+    return SideResult(preference, answers, *(_tally(part, weights, learned, expert) for part in (trained, unseen)))
 
 
 def _tally(shown: list[LearningDemonstration], weights: Array, learned: Array, expert: ScriptedExpert) -> Tally:

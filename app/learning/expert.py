@@ -21,7 +21,7 @@ class ScriptedExpert:
     """
 
     weights: Array | None  # (n + m,)
-    effort_weights: Array | None  # (8,)
+    effort_weights: Array | None  # (8,) or (10,)
 
     def sequence(self, problem: SequencingProblem) -> Sequence:
         """The order this expert would demonstrate."""

@@ -16,7 +16,7 @@ class Policy:
     features: str  # name of the feature set
     version: int  # of the feature set
     interactions: tuple[Interaction, ...]
-    effort_weights: Array | None  # (8,) on effort_features, None when effort was not learned
+    effort_weights: Array | None  # (8,) or (10,) on effort_features, None when effort was not learned
     identifiable: tuple[bool, ...]  # (n + m,) False: no demonstrated tool could say anything about this weight
 
     def check(self, problem: SequencingProblem) -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from app.learning.effort_features import effort_ends, effort_penalty
+from app.learning.effort_features import effort_ends, effort_penalty, only_ends
 from app.learning.policy import Policy
 from app.learning.qp import Array
 from app.sequencing.bounds import lower_bound
@@ -52,14 +52,17 @@ def predict(
     policy.check(problem)
     effort = policy.effort_weights
     breaks = effort is not None and bool((effort != 0).any())
-    tie_break = effort_ends(problem, effort) if effort is not None and breaks else None
+    tie_break = None
+    if effort is not None and breaks:
+        tie_break = effort_ends(problem, effort) if only_ends(effort) else lambda s: effort_penalty(problem, effort, s)
     best = shortest_sequence(problem, policy.weights, tie_break, constraints)
     bound = best.cost
     if not best.proved:
         bound = lower_bound(problem, policy.weights, best.cost, resolve(constraints, problem.n), should_stop=should_stop)
     settled = None
     if best.ties > 1:
-        settled = "least effort at start and end" if breaks else "region names: no effort was learned"
+        way = "on the way" if effort is not None and not only_ends(effort) else "at start and end"
+        settled = f"least effort {way}" if breaks else "region names: no effort was learned"
     return Prediction(
         sequence=best.sequence,
         cost=best.cost,

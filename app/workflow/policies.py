@@ -10,7 +10,7 @@ import numpy as np
 from sqlmodel import Session, col, select
 
 from app.errors import IncompleteSequence
-from app.learning.effort_features import EFFORT_COLUMNS
+from app.learning.effort_features import ALL_COLUMNS
 from app.learning.policy import Policy
 from app.learning.prediction import Prediction, predict
 from app.sequencing.constraints import Constraints, resolve
@@ -146,7 +146,7 @@ def policy_json(session: Session, row: PolicyRow) -> Json:
         ],
         "effort_weights": None
         if effort is None
-        else [{"key": key, "label": label, "value": value} for (key, label), value in zip(EFFORT_COLUMNS, effort, strict=True)],
+        else [{"key": key, "label": label, "value": value} for (key, label), value in zip(ALL_COLUMNS, effort, strict=False)],
         "converged": row.converged,
         "certificate": row.certificate,
         "learned_from": row.learned_from,

@@ -55,6 +55,11 @@ def parameters_for(learns: str, params: Json) -> PerformanceParameters | Certifi
         if key not in WORDS[learns]:
             raise InvalidInput(f"There is no parameter {key!r}. Known are: {', '.join(WORDS[learns])}.")
         whole = isinstance(getattr(defaults, key), int)
+        if isinstance(getattr(defaults, key), bool):
+            if value not in (0, 1):
+                raise InvalidInput(f"“{WORDS[learns][key][1]}” is true or false, not {value!r}.")
+            known[key] = bool(value)
+            continue
         label, most = WORDS[learns][key][1], MOST.get(key, 1 if key in UP_TO_ONE else 1_000_000)
         if isinstance(value, bool) or (whole and value != int(value)):
             raise InvalidInput(f"{label} is a {'whole number' if whole else 'number'}, not {value!r}.")

@@ -29,7 +29,7 @@ def test_coverage_prints_ours_beside_the_published_numbers(tmp_path: Path):
 def test_effort_is_never_worse_after_learning(tmp_path: Path):
     run("effort", "--out", str(tmp_path))
     rows = json.loads((tmp_path / "effort.json").read_text())
-    assert len(rows) == 8
+    assert len(rows) == 10
     assert all(r[part]["after"] >= r[part]["before"] for r in rows for part in ("trained", "unseen"))
     assert sum(r["unseen"]["after"] for r in rows) >= sum(r["unseen"]["before"] for r in rows) + 4
     assert max(r["answers"] for r in rows) <= 5

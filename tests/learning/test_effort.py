@@ -7,7 +7,7 @@ import pytest
 
 from app.errors import EmptySample
 from app.learning.effort import EffortParameters, EffortState, _Answered, _fit, _smallest_conflict, effort_step, fit_pooled, start_effort
-from app.learning.effort_features import EFFORT_COLUMNS, effort_features, effort_penalty
+from app.learning.effort_features import EFFORT_COLUMNS, all_effort_features, effort_features, effort_penalty
 from app.learning.expert import ScriptedExpert
 from app.learning.performance import LearningDemonstration
 from app.sequencing.classes import optimal_sequences
@@ -176,3 +176,29 @@ def test_pooled_threshold_satisfies_the_optimality_conditions():
         step = rng.normal(size=8) * 10 ** rng.uniform(-4, 0)
         assert objective(np.maximum(w + step, 0.0)) >= objective(w) - 1e-7
     assert not fit_pooled(better, worse[:0], parameters).any()  # nothing unpreferred: no penalty
+
+
+def test_travel_and_side_changes_by_hand():
+    """2 x 3 grid, centres 0, .5, 1 by 0, 1: row by row goes .5, .5, then back over (1, 1); as a snake the way is shorter."""
+    problem = problem_for(grid_graph(2, 3, 1))
+    way = (4 * 0.5 + np.sqrt(2)) / (5 * np.sqrt(2))
+    z = all_effort_features(problem, (0, 1, 2, 3, 4, 5))
+    assert z[8:] == pytest.approx([way, 3 / 5])  # left, middle, right | left, middle, right
+    snake = all_effort_features(problem, (0, 1, 2, 5, 4, 3))
+    assert snake[8:] == pytest.approx([(4 * 0.5 + 1) / (5 * np.sqrt(2)), 2 / 5])
+    assert effort_penalty(problem, np.r_[np.zeros(8), 2.0, 1.0], (0, 1, 2, 3, 4, 5)) == pytest.approx(2 * way + 3 / 5)
+
+
+@pytest.mark.parametrize("column", [8, 9])
+def test_shorter_ways_and_fewer_changes_of_side_are_learned_when_switched_on(demos, column):
+    """The settled order of each tool has the least effort to the expert, among all equally cheap ones; off by default."""
+    wish = np.eye(10)[column]
+    expert = ScriptedExpert(WEIGHTS, wish)
+    plain, answers = teach(demos, expert)
+    assert len(plain.effort_weights) == 8
+    result, answers = teach(demos, expert, EffortParameters(travel=True, side_changes=True))
+    assert len(answers) <= EffortParameters().most
+    for d in demos:
+        own = optimal_sequences(d.problem, WEIGHTS).sequences
+        chosen = min(own, key=lambda s: (effort_penalty(d.problem, result.effort_weights, s), s))
+        assert effort_penalty(d.problem, wish, chosen) == pytest.approx(min(effort_penalty(d.problem, wish, s) for s in own))

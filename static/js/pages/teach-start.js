@@ -9,6 +9,7 @@ import { complain } from "../toasts.js";
 import { ago, number, plural } from "../words.js";
 
 function parameterField(entry) {
+  if (typeof entry.value === "boolean") return h("label.check", {}, h("input", { type: "checkbox", name: entry.key, checked: entry.value }), h("span.symbol", { dataset: { tip: `${entry.symbol} in the effort's features, usually ${entry.default ? "on" : "off"}` } }, entry.label));
   const field = h("input.field", { type: "number", step: "any", value: String(entry.value ?? ""), name: entry.key, "aria-label": entry.label, placeholder: entry.default === null ? "none" : String(entry.default) });
   return h("label", {}, h("span", {}, h("span.symbol", { dataset: { tip: `${entry.symbol} in the paper, usually ${number(entry.default)}` } }, entry.label)), field);
 }
@@ -33,7 +34,12 @@ async function parameterDrawer(projectId, kind, mode = "certified") {
   const values = () => {
     const params = {};
     for (const entry of parameters) {
-      const text = node.querySelector(`[name="${entry.key}"]`).value;
+      const field = node.querySelector(`[name="${entry.key}"]`);
+      if (typeof entry.value === "boolean") {
+        if (field.checked !== entry.value) params[entry.key] = field.checked;
+        continue;
+      }
+      const text = field.value;
       if (text !== "" && Number(text) !== entry.value) params[entry.key] = Number(text);
     }
     return params;

@@ -23,6 +23,8 @@ const KEY_FACTS = 4;
 
 export const explained = (violations) => (violations === 0 ? "every demonstration explained" : `${plural(violations, "demonstration")} not yet explained`);
 
+const shown = (value) => (typeof value === "boolean" ? (value ? "yes" : "no") : number(value));
+
 export class Training {
   constructor({ onCancel }) {
     this.onCancel = onCancel;
@@ -65,7 +67,7 @@ export class Training {
   drawParameters(run) {
     const changed = run.parameters.filter((entry) => entry.value !== entry.default);
     const chosen = [...changed, ...run.parameters.filter((entry) => !changed.includes(entry))].slice(0, KEY_FACTS);
-    fill(this.parameters, chosen.map((entry) => h("div.fact", {}, h("dt", {}, h("span.symbol", { tabindex: "0", dataset: { tip: `${entry.symbol}, usually ${number(entry.default)}` } }, entry.label)), h("dd", {}, number(entry.value)))));
+    fill(this.parameters, chosen.map((entry) => h("div.fact", {}, h("dt", {}, h("span.symbol", { tabindex: "0", dataset: { tip: `${entry.symbol}, usually ${shown(entry.default)}` } }, entry.label)), h("dd", {}, shown(entry.value)))));
   }
 
   // Reads what is new since the last iteration known.
