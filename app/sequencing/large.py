@@ -27,6 +27,7 @@ BLOCK = 3  # regions moved elsewhere together then
 AVOIDING = 20_000  # starts of orders looked at for one without forbidden neighbours
 IMPROVES = 1e-9  # relative gain below which a move counts as no improvement
 
+Found = tuple[float, tuple[int, ...]]  # cost and order
 Report = Callable[[float, float], None]  # (share of the budget used, cost of the best order so far)
 
 
@@ -236,17 +237,7 @@ def best_found(
     effort = effort or (NORMAL if search.model is not None else SLOW)
     if not len(search.free):
         return r.done
-    found: list[tuple[float, tuple[int, ...]]] = []
-    stopped = False
-    for start in _starts(search, problem, w, r, effort):
-        cost, order = search.descend(start, effort.stretch)
-        if not found or cost < min(found)[0]:
-            report(0.0, cost)
-        found.append((cost, tuple(order.tolist())))
-        stopped = should_stop()
-        if stopped:
-            break
-    best = sorted(set(found))[: effort.kept]
+    best, stopped = _descents(search, _starts(search, problem, w, r, effort), effort, should_stop, report)
     lowest = best[0]
     for turn, begin in enumerate(() if stopped else best):
         lowest = min(lowest, _wander(search, begin, effort, (turn, len(best)), lowest[0], should_stop, report))
@@ -259,7 +250,22 @@ def best_found(
     return r.done + lowest[1]
 
 
-def _mended(search: Search, order: tuple[int, ...], effort: Effort) -> tuple[float, tuple[int, ...]]:
+def _descents(
+    search: Search, starts: Iterator[Order], effort: Effort, should_stop: Callable[[], bool], report: Report
+) -> tuple[list[Found], bool]:
+    """The best of what the starts descend to, cheapest first, and whether to stop there."""
+    found: list[Found] = []
+    for start in starts:
+        cost, order = search.descend(start, effort.stretch)
+        if not found or cost < min(found)[0]:
+            report(0.0, cost)
+        found.append((cost, tuple(order.tolist())))
+        if should_stop():
+            return sorted(set(found)), True
+    return sorted(set(found))[: effort.kept], False
+
+
+def _mended(search: Search, order: tuple[int, ...], effort: Effort) -> Found:
     """An order near this one that has no forbidden neighbours, made cheaper by stretches."""
     start = search.avoiding(order)
     if start is None:
@@ -289,13 +295,13 @@ def _starts(search: Search, problem: SequencingProblem, w: Array, r: Resolved, e
 
 def _wander(
     search: Search,
-    begin: tuple[float, tuple[int, ...]],
+    begin: Found,
     effort: Effort,
     turn: tuple[int, int],
     lowest: float,
     should_stop: Callable[[], bool],
     report: Report,
-) -> tuple[float, tuple[int, ...]]:
+) -> Found:
     """Moves from one start, the best order met."""
     cost, order = begin[0], np.array(begin[1], np.int64)
     best, best_order, idle = cost, order, 0

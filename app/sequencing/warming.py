@@ -31,7 +31,7 @@ def warm_up() -> None:
     equivalent_sequences(problem, best.sequence)
     cost_to_go(problem, w)
     best_found(problem, w, effort=Effort(moves=2, beams=(1,), sweeps=False))
-    lower_bound(problem, w, best.cost, steps=2)
+    lower_bound(problem, w, best.cost, resolve(Constraints(never_next=((0, 1),)), n), steps=2)
     if parallel_is_safe():
         model = model_for(problem, resolve(None, n))
         costs_to_go(model, form_for(model, w), threads=True)

@@ -8,6 +8,8 @@ region of the stretch is taken, this is the best order of the stretch (the windo
 # pyright: reportArgumentType=false, reportPossiblyUnboundVariable=false
 # Compiled code: the checker takes elements of arrays for arrays.
 
+from typing import NamedTuple
+
 import numba as nb
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +67,32 @@ def add_finished(m: Model, b: int, border: Array, edge: NDArray[np.int64], corne
         corner[a] += m.corner[a, b]
 
 
+class Past(NamedTuple):
+    """What is finished before the stretch, or by the regions of it that stay."""
+
+    finished: NDArray[np.bool_]  # (N,)
+    sums: Array  # (3,) number, curvature, level
+    border: Array  # (N, 3) taken of each one's shared border, opposite border and turn
+    edge: Order  # (N,) neighbours
+    corner: Order  # (N,)
+
+
+class Choice(NamedTuple):
+    """The k regions taken out, their subsets, and in the last place the next of the regions that stay."""
+
+    region: Order  # (k + 1,)
+    slot: Order  # (N,) which of the k a region is, -1 for others
+    edge: Order  # (k + 1,) neighbours among the k, as bits
+    corner: Order  # (k + 1,)
+    need: Order  # (k + 1,) those of the k that have to be finished first, as bits
+    ready: Order  # (k + 1,) how many of those that stay have to be
+    lowest: Order  # (2^k,) lowest bit
+    sums: Array  # (2^k, 3) number, curvature, level
+    border: Array  # (2^k, k + 1, 3) what a subset takes of each one's borders and turn
+    boxes: Array  # (2^k, 7) box around what is finished
+    after: Array  # (2^k, 7) and around the rest
+
+
 @nb.njit(cache=True, nogil=True, error_model="numpy")
 def reinsert(
     m: Model, order: Order, done: NDArray[np.bool_], before: NDArray[np.bool_], start: int, stop: int, taken: Order, out: Order
@@ -73,139 +101,170 @@ def reinsert(
 
     `before[b, a]`: b has to come before a. False when no such order is allowed (`out` is then the order itself).
     """
-    k, n = len(taken), m.n
-    out[:] = order
-    rest = np.empty(stop - start - k, np.int64)
-    items = order[taken]
-    slot = np.full(n, -1)  # which item a region is
-    for i in range(k):
-        slot[items[i]] = i
+    k, out[:] = len(taken), order
+    c = _choose(m, order[taken], before)
+    stay = np.empty(stop - start - k, np.int64)
     r = 0
     for p in range(start, stop):
-        if slot[order[p]] < 0:
-            rest[r] = order[p]
+        if c.slot[order[p]] < 0:
+            stay[r] = order[p]
             r += 1
-    full = (1 << k) - 1
-    phi, extra = np.zeros(len(m.w) + 1), np.zeros(3)
-    # what the subsets of the items add
-    sub_border, sub_next = np.zeros((full + 1, k, 3)), np.zeros((full + 1, 3))
-    sub_curve, sub_level, sub_count = np.zeros(full + 1), np.zeros(full + 1), np.zeros(full + 1, np.int64)
-    low_item = np.zeros(full + 1, np.int64)
-    for s in range(1, full + 1):
-        i = 0
-        while not s >> i & 1:
-            i += 1
-        b, parent = items[i], s & (s - 1)
-        low_item[s] = i
-        sub_curve[s], sub_level[s] = sub_curve[parent] + m.curvature[b], sub_level[parent] + m.level[b]
-        sub_count[s] = sub_count[parent] + 1
-        for j in range(k):
-            sub_border[s, j, 0] = sub_border[parent, j, 0] + m.shared[items[j], b]
-            sub_border[s, j, 1] = sub_border[parent, j, 1] + m.opposite[items[j], b]
-            sub_border[s, j, 2] = sub_border[parent, j, 2] + m.turn[items[j], b]
-    item_edge, item_corner, item_need = np.zeros(k, np.int64), np.zeros(k, np.int64), np.zeros(k, np.int64)
-    item_ready = np.zeros(k, np.int64)  # rest regions that have to be finished first
     for i in range(k):
-        for j in range(k):
-            item_edge[i] |= np.int64(m.edge[items[i], items[j]]) << j
-            item_corner[i] |= np.int64(m.corner[items[i], items[j]]) << j
-            item_need[i] |= np.int64(before[items[j], items[i]]) << j
         for j in range(r):
-            if before[rest[j], items[i]]:
-                item_ready[i] = j + 1
-    # the prefix
-    border, edge, corner = np.zeros((n, 3)), np.zeros(n, np.int64), np.zeros(n, np.int64)
-    finished = done.copy()
-    count, curve, level = 0, 0.0, 0.0
-    boxes, after = np.full((full + 1, 7), np.nan), np.full((full + 1, 7), np.nan)
-    no_box(boxes, 0)
-    for p in range(start):
-        finished[order[p]] = True
-    for b in range(n):
-        if finished[b]:
-            count, curve, level = count + 1, curve + m.curvature[b], level + m.level[b]
-            add_finished(m, b, border, edge, corner)
-            grow_box(m, boxes, 0, 0, b)
-    # boxes of what is unfinished apart from the items, from each rest region on
-    tails = np.full((r + 1, 7), np.nan)
-    no_box(tails, r)
-    within = np.zeros(n, np.bool_)
-    for p in range(start, stop):
-        within[order[p]] = True
-    for b in range(n):
-        if not finished[b] and not within[b]:
-            grow_box(m, tails, r, r, b)
-    for j in range(r - 1, -1, -1):
-        grow_box(m, tails, j, j + 1, rest[j])
-    value, came = np.full((r + 1, full + 1), np.inf), np.full((r + 1, full + 1), -1, np.int8)
+            if before[stay[j], c.region[i]]:
+                c.ready[i] = j + 1
+    past = _past(m, order[:start], done, c)
+    tails = _tails(m, past.finished, order[start:stop], stay)
+    value, came = np.full((r + 2, 1 << k), np.inf), np.full((r + 2, 1 << k), -1, np.int8)
     value[0, 0] = 0.0
     for j in range(r + 1):
-        after[full] = tails[j]
-        for s in range(full - 1, -1, -1):
-            i = 0
-            while s >> i & 1:
-                i += 1
-            grow_box(m, after, s, s | 1 << i, items[i])
-        a, need = -1, 0
         if j < r:
-            a = rest[j]
-            next_edge, next_corner = 0, 0
-            for i in range(k):
-                next_edge |= np.int64(m.edge[a, items[i]]) << i
-                next_corner |= np.int64(m.corner[a, items[i]]) << i
-                need |= np.int64(before[items[i], a]) << i
-        for s in range(full + 1):
-            if s:
-                b, parent = items[low_item[s]], s & (s - 1)
-                grow_box(m, boxes, s, parent, b)
-                if a >= 0:
-                    sub_next[s, 0] = sub_next[parent, 0] + m.shared[a, b]
-                    sub_next[s, 1] = sub_next[parent, 1] + m.opposite[a, b]
-                    sub_next[s, 2] = sub_next[parent, 2] + m.turn[a, b]
-            spent = value[j, s]
-            if spent == np.inf:
-                continue
-            gaps, left = gap_of(boxes, s), gap_of(after, s)
-            many, bend, high = count + sub_count[s], curve + sub_curve[s], level + sub_level[s]
-            for i in range(k):
-                if s >> i & 1 or item_ready[i] > j or item_need[i] & ~s:
-                    continue
-                c, f = items[i], m.first[items[i]]
-                beside = f >= 0 and (finished[f] or (slot[f] >= 0 and s >> slot[f] & 1))
-                for q in range(3):
-                    extra[q] = border[c, q] + sub_border[s, i, q]
-                has_edge, has_corner = edge[c] > 0 or item_edge[i] & s != 0, corner[c] > 0 or item_corner[i] & s != 0
-                x = spent + transition_cost(m, c, many, bend, high, extra, has_edge, has_corner, beside, gaps, left, phi)
-                if x < value[j, s | 1 << i]:
-                    value[j, s | 1 << i] = x
-                    came[j, s | 1 << i] = i
-            if a >= 0 and not need & ~s:
-                f = m.first[a]
-                beside = f >= 0 and (finished[f] or (slot[f] >= 0 and s >> slot[f] & 1))
-                for q in range(3):
-                    extra[q] = border[a, q] + sub_next[s, q]
-                has_edge, has_corner = edge[a] > 0 or next_edge & s != 0, corner[a] > 0 or next_corner & s != 0
-                x = spent + transition_cost(m, a, many, bend, high, extra, has_edge, has_corner, beside, gaps, left, phi)
-                if x < value[j + 1, s]:
-                    value[j + 1, s] = x
-                    came[j + 1, s] = k
-        if a >= 0:
-            finished[a] = True
-            count, curve, level = count + 1, curve + m.curvature[a], level + m.level[a]
-            add_finished(m, a, border, edge, corner)
-            grow_box(m, boxes, 0, 0, a)
-    if value[r, full] == np.inf:
+            _meet(m, c, stay[j], before)
+        _layer_boxes(m, c, tails[j])
+        _layer(m, c, past, j, j < r, value, came)
+        if j < r:
+            _finish(m, past, c, stay[j])
+    if value[r, (1 << k) - 1] == np.inf:
         return False
-    j, s = r, full
+    _write(c.region, stay, came, start, stop, out)
+    return True
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def _choose(m: Model, items: Order, before: NDArray[np.bool_]) -> Choice:
+    k, region = len(items), np.zeros(len(items) + 1, np.int64)
+    size, slot = 1 << k, np.full(m.n, -1)
+    region[:k] = items
+    edge, corner, need, ready = (np.zeros(k + 1, np.int64), np.zeros(k + 1, np.int64), np.zeros(k + 1, np.int64), np.zeros(k + 1, np.int64))
+    lowest, sums, border = np.zeros(size, np.int64), np.zeros((size, 3)), np.zeros((size, k + 1, 3))
+    boxes, after = np.full((size, 7), np.nan), np.full((size, 7), np.nan)
+    c = Choice(region, slot, edge, corner, need, ready, lowest, sums, border, boxes, after)
+    for s in range(1, size):
+        i, parent = 0, s & (s - 1)
+        while not s >> i & 1:
+            i += 1
+        lowest[s] = i
+        sums[s, 0], sums[s, 1], sums[s, 2] = (
+            sums[parent, 0] + 1,
+            sums[parent, 1] + m.curvature[items[i]],
+            sums[parent, 2] + m.level[items[i]],
+        )
+    for i in range(k):
+        slot[items[i]] = i
+        _join(m, c, i, before)
+    return c
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def _join(m: Model, c: Choice, i: int, before: NDArray[np.bool_]) -> None:
+    """What the k regions mean to the one in place i."""
+    a, k = c.region[i], len(c.region) - 1
+    c.edge[i], c.corner[i], c.need[i] = 0, 0, 0
+    for j in range(k):
+        b = c.region[j]
+        c.edge[i] |= np.int64(m.edge[a, b]) << j
+        c.corner[i] |= np.int64(m.corner[a, b]) << j
+        c.need[i] |= np.int64(before[b, a]) << j
+    for s in range(1, len(c.lowest)):
+        b, parent = c.region[c.lowest[s]], s & (s - 1)
+        c.border[s, i, 0] = c.border[parent, i, 0] + m.shared[a, b]
+        c.border[s, i, 1] = c.border[parent, i, 1] + m.opposite[a, b]
+        c.border[s, i, 2] = c.border[parent, i, 2] + m.turn[a, b]
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def _meet(m: Model, c: Choice, a: int, before: NDArray[np.bool_]) -> None:
+    """Region a is the next of those that stay."""
+    c.region[-1] = a
+    _join(m, c, len(c.region) - 1, before)
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def _past(m: Model, prefix: Order, done: NDArray[np.bool_], c: Choice) -> Past:
+    past = Past(done.copy(), np.zeros(3), np.zeros((m.n, 3)), np.zeros(m.n, np.int64), np.zeros(m.n, np.int64))
+    no_box(c.boxes, 0)
+    for b in range(m.n):
+        if done[b]:
+            _finish(m, past, c, b)
+    for b in prefix:
+        _finish(m, past, c, b)
+    return past
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def _finish(m: Model, past: Past, c: Choice, b: int) -> None:
+    """Region b is finished whatever becomes of the k."""
+    past.finished[b] = True
+    past.sums[0], past.sums[1], past.sums[2] = past.sums[0] + 1, past.sums[1] + m.curvature[b], past.sums[2] + m.level[b]
+    add_finished(m, b, past.border, past.edge, past.corner)
+    grow_box(m, c.boxes, 0, 0, b)
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def _tails(m: Model, finished: NDArray[np.bool_], stretch: Order, stay: Order) -> Array:
+    """Boxes of what is unfinished apart from the k, from each region that stays on."""
+    r, outside = len(stay), ~finished
+    tails = np.full((r + 1, 7), np.nan)
+    no_box(tails, r)
+    for b in stretch:
+        outside[b] = False
+    for b in range(m.n):
+        if outside[b]:
+            grow_box(m, tails, r, r, b)
+    for j in range(r - 1, -1, -1):
+        grow_box(m, tails, j, j + 1, stay[j])
+    return tails
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def _layer_boxes(m: Model, c: Choice, tail: Array) -> None:
+    """Boxes around what is finished and around the rest for every subset of the k."""
+    full = len(c.lowest) - 1
+    c.after[full] = tail
+    for s in range(full - 1, -1, -1):
+        i = c.lowest[full ^ s]
+        grow_box(m, c.after, s, s | 1 << i, c.region[i])
+    for s in range(1, full + 1):
+        grow_box(m, c.boxes, s, s & (s - 1), c.region[c.lowest[s]])
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def _layer(m: Model, c: Choice, past: Past, j: int, more: bool, value: Array, came: NDArray[np.int8]) -> None:
+    """All steps where j of the regions that stay are finished; `more` says that another one is to come."""
+    k, phi, border = len(c.region) - 1, np.zeros(len(m.w) + 1), np.zeros(3)
+    for s in range(len(c.lowest)):
+        if value[j, s] == np.inf:
+            continue
+        gaps, left = gap_of(c.boxes, s), gap_of(c.after, s)
+        count, curve, level = int(past.sums[0] + c.sums[s, 0]), past.sums[1] + c.sums[s, 1], past.sums[2] + c.sums[s, 2]
+        for i in range(k + 1 if more else k):
+            if (i < k and (s >> i & 1 or c.ready[i] > j)) or c.need[i] & ~s:
+                continue
+            a = c.region[i]
+            f = m.first[a]
+            beside = f >= 0 and (past.finished[f] or (c.slot[f] >= 0 and s >> c.slot[f] & 1))
+            for q in range(3):
+                border[q] = past.border[a, q] + c.border[s, i, q]
+            edge, corner = past.edge[a] > 0 or c.edge[i] & s != 0, past.corner[a] > 0 or c.corner[i] & s != 0
+            x = value[j, s] + transition_cost(m, a, count, curve, level, border, edge, corner, beside, gaps, left, phi)
+            to, then = (j, s | 1 << i) if i < k else (j + 1, s)
+            if x < value[to, then]:
+                value[to, then], came[to, then] = x, i
+
+
+@nb.njit(cache=True, nogil=True, error_model="numpy")
+def _write(region: Order, stay: Order, came: NDArray[np.int8], start: int, stop: int, out: Order) -> None:
+    """The way to the end, backwards."""
+    k, j = len(region) - 1, len(stay)
+    s = (1 << k) - 1
     for p in range(stop - 1, start - 1, -1):
         i = came[j, s]
         if i == k:
             j -= 1
-            out[p] = rest[j]
+            out[p] = stay[j]
         else:
             s ^= 1 << i
-            out[p] = items[i]
-    return True
+            out[p] = region[i]
 
 
 def reinsert_by_values(
