@@ -23,7 +23,7 @@ ALLOWED: dict[str, set[str]] = {
     "api": {"errors", "settings", "workflow", *CORE},
     "viewer": {"errors", "settings", "workflow", *CORE},
     "main": {"errors", "settings", "storage", "jobs", "workflow", "api", "viewer"},
-    "benches": {"errors", *CORE},
+    "benches": {"errors", "settings", "workflow", "viewer", *CORE},
     "cli": {"errors", "settings", "storage", "workflow", "main", "benches", *CORE},
 }
 CORE_THIRD_PARTY = {"numpy", "scipy", "numba", "llvmlite", "trimesh", "mujoco", "clarabel", "cascadio", "networkx"}

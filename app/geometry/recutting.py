@@ -1,7 +1,7 @@
 """Cut a tool anew by parameters, around regions that a person has locked."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +13,22 @@ from app.geometry.importing import ImportedPart
 from app.geometry.merge_tree import MergeTree
 from app.geometry.pieces import tree_for
 from app.geometry.regions import measure, measure_labelled
-from app.geometry.segmentation import MOST_TARGET, Report, SegmentationParameters, ignore, segment
+from app.geometry.segmentation import MOST_TARGET, Cut, Patches, Report, SegmentationParameters, ignore, segment
 from app.geometry.splitting import connected
 from app.geometry.tool import Tool, region_letters
 
 ROUNDS = 3  # of cutting more finely around locked regions
 LETTERS = 702  # A to ZZ: names nobody gave
 SCRAP = 0.01  # share of the working surface below which what is left of a new region beside a locked one goes to a neighbour
+
+
+@dataclass(frozen=True)
+class Recut:
+    """A tool cut anew."""
+
+    tool: Tool
+    held: tuple[int, ...]  # the numbers the locked regions have in it
+    tree: MergeTree  # the merge tree on its triangles
 
 
 def recut(
@@ -29,8 +38,9 @@ def recut(
     before: Tool | None = None,
     locked: Sequence[int] = (),
     report: Report = ignore,
-) -> tuple[Tool, tuple[int, ...]]:
-    """Cut a part; with its kept tree that takes no time.
+    patches: Patches | None = None,
+) -> Recut:
+    """Cut a part; with its kept tree and patches that takes no time.
 
     Args:
         part: The part.
@@ -39,15 +49,13 @@ def recut(
         before: The tool as it was cut so far; regions that stay the same keep the names people gave them.
         locked: Regions of `before` that stay.
         report: Told the progress.
-
-    Returns:
-        The tool, and the numbers the locked regions have in it.
+        patches: What `find_patches` found with these parameters, where it was kept; only of use without locked regions.
     """
     if before is not None and locked:
         return recut_around(before, locked, part, parameters, tree_for(before, part, tree))
-    cut = segment(part, parameters, report, tree)
+    cut = segment(part, parameters, report, tree, patches)
     tool = measure(cut.part.mesh, cut.labels)
-    return (tool if before is None else _with_given_names(before, tool)), ()
+    return Recut(tool if before is None else _with_given_names(before, tool), (), cut.tree)
 
 
 def _with_given_names(before: Tool, tool: Tool) -> Tool:
@@ -60,10 +68,8 @@ def _with_given_names(before: Tool, tool: Tool) -> Tool:
     return replace(tool, regions=tuple(replace(r, name=given.get(i, r.name)) for i, r in enumerate(tool.regions)))
 
 
-def recut_around(
-    tool: Tool, locked: Sequence[int], part: ImportedPart, parameters: SegmentationParameters, tree: MergeTree
-) -> tuple[Tool, tuple[int, ...]]:
-    """Cut everything but the locked regions anew; they keep their names.
+def recut_around(tool: Tool, locked: Sequence[int], part: ImportedPart, parameters: SegmentationParameters, tree: MergeTree) -> Recut:
+    """Cut everything but the locked regions anew; they keep their names, and get the first numbers.
 
     Args:
         tool: The tool as it is.
@@ -71,9 +77,6 @@ def recut_around(
         part: The part it was made from, for its CAD faces.
         parameters: How finely to cut the rest.
         tree: The merge tree on the tool's triangles.
-
-    Returns:
-        The tool, and the numbers the locked regions have in it: the first ones.
     """
     here = replace(part, mesh=tool.mesh, cad_face=np.full(len(tool.mesh.faces), -1, np.int32))
     made, labels = _cut_beside(here, tool, locked, parameters, tree)
@@ -87,13 +90,13 @@ def recut_around(
     count = int(labels.max()) + 1
     free = [name for name in region_letters(count + len(kept)) if name not in kept]
     names = [*kept, *free[: count - len(kept)]]
-    return measure_labelled(made.mesh, labels, names), tuple(range(len(kept)))
+    return Recut(measure_labelled(made.part.mesh, labels, names), tuple(range(len(kept))), made.tree)
 
 
 def _cut_beside(
     part: ImportedPart, tool: Tool, locked: Sequence[int], parameters: SegmentationParameters, tree: MergeTree
-) -> tuple[ImportedPart, NDArray[np.int32]]:
-    """The part with the locked regions of the tool as labels 0, 1, ... and the new ones behind them."""
+) -> tuple[Cut, NDArray[np.int32]]:
+    """The cut with the locked regions of the tool as labels 0, 1, ... and the new ones behind them."""
     cut = segment(part, parameters, tree=tree)
     before = tool.labels[cut.source]
     held = np.isin(before, list(locked))
@@ -101,7 +104,7 @@ def _cut_beside(
     labels[held] = np.searchsorted(sorted(locked), before[held])
     labels = _without_scraps(cut.part, labels, len(locked))
     present = np.unique(labels[labels >= 0])
-    return cut.part, np.where(labels >= 0, np.searchsorted(present, labels), -1).astype(np.int32)
+    return cut, np.where(labels >= 0, np.searchsorted(present, labels), -1).astype(np.int32)
 
 
 def _without_scraps(part: ImportedPart, labels: np.ndarray, locked: int) -> np.ndarray:

@@ -8,9 +8,11 @@ from numpy.typing import NDArray
 from app.errors import InvalidInput
 from app.geometry.attributes import Attributes, find_attributes, region_boxes
 from app.geometry.borders import corner_neighbours, find_borders, opposite_lengths
+from app.geometry.cleaning import face_pairs
 from app.geometry.descriptions import describe
-from app.geometry.fitting import face_sums
-from app.geometry.merging import build_tree
+from app.geometry.fitting import AREA, NORMAL_WEIGHT, add_up, face_sums
+from app.geometry.merging import absorb_small, build_tree
+from app.geometry.splitting import quantiles
 from app.geometry.tool import Array, Mesh, Region, RegionGraph, Tool, region_letters
 
 ROW_OVERLAP = 0.5  # share of the smaller region's depth that two regions of one row have in common
@@ -129,4 +131,10 @@ def _regions(attributes: Attributes, names: Sequence[str] | None) -> tuple[Regio
 def warm_up() -> None:
     """Compile the fitting kernels, or load them from the cache, before somebody waits for them."""
     vertices = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.1], [1.0, 1.0, 0.0], [0.0, 1.0, 0.2]])
-    build_tree(face_sums(vertices, np.array([[0, 1, 2], [0, 2, 3]])), np.arange(2), np.array([[0, 1]]), lambda _: None)
+    faces = np.array([[0, 1, 2], [0, 2, 3]])
+    sums, pairs = face_sums(vertices, faces), face_pairs(faces)
+    tree = build_tree(sums, np.arange(2), pairs, lambda _: None)
+    tree.children_of(tree.cut(1, tolerance=0.1), 0)
+    absorb_small(sums, pairs, 0.1, 1, NORMAL_WEIGHT)
+    quantiles(vertices[faces][:, :, 0], add_up(sums, np.arange(2))[:, AREA], np.array([0.5]))
+    measure(Mesh(vertices, faces.astype(np.int32)), np.zeros(2, np.int32))

@@ -19,7 +19,7 @@ from app.geometry.compiled import kernel
 from app.geometry.tool import Array
 
 Integers = NDArray[np.int64]
-ON_PLANE = 1e-5  # share of the diagonal within which a vertex lies on the cutting plane
+ON_PLANE = 1e-5  # share of the diagonal of the surface that is cut within which a vertex lies on the cutting plane
 LARGE = 0.2  # regions with a larger share of the working surface are cut
 SCRAP = 0.35  # pieces below this share of an equal part go to the piece they share most border with
 UNEVEN, EXTRA = 0.3, 0.3  # what rows of different length and one part too many cost, against the log aspect of a part
@@ -53,35 +53,45 @@ def split_large(surface: Surface, least: int, most: int, large: float = LARGE) -
             break
         room = most - int(parts.sum())
         for region in np.flatnonzero(parts > 1):
-            near, others = _taken_out(surface, int(region))
+            apart = _taken_out(surface, int(region))
             free = int(surface.labels.max()) + 1
-            near, extra = _split(near, int(region), int(parts[region]), room > 0, free)
-            surface = _put_back(near, others)
+            near, extra = _split(apart.near, int(region), int(parts[region]), room > 0, free)
+            surface = _put_back(surface, replace(apart, near=near))
             room -= extra
     return surface
 
 
-def _taken_out(surface: Surface, region: int) -> tuple[Surface, Surface]:
-    """The faces of a region with all that touch them, and the rest: cutting the few is quicker than cutting all."""
+@dataclass(frozen=True)
+class _Apart:
+    """A region with the faces that touch it, as a surface of its own: cutting the few is quicker than cutting all."""
+
+    near: Surface
+    others: NDArray[np.bool_]  # (F,) faces of the whole surface that are not in it
+    vertices: Integers  # vertex of the whole surface that each of its first vertices is
+
+
+def _taken_out(surface: Surface, region: int) -> _Apart:
     mark = np.zeros(len(surface.vertices), bool)
     mark[surface.faces[surface.labels == region]] = True
     a, b, c = mark[surface.faces].T
     near: NDArray[np.bool_] = a | b | c
-    return _chosen(surface, near), _chosen(surface, ~near)
+    faces = surface.faces[near]
+    mark[faces] = True
+    number = np.cumsum(mark) - 1
+    small = Surface(surface.vertices[mark], number[faces], surface.cad_face[near], surface.labels[near], surface.source[near])
+    return _Apart(small, ~near, np.flatnonzero(mark))
 
 
-def _chosen(surface: Surface, which: NDArray[np.bool_]) -> Surface:
-    return Surface(surface.vertices, surface.faces[which], surface.cad_face[which], surface.labels[which], surface.source[which])
-
-
-def _put_back(near: Surface, others: Surface) -> Surface:
-    """The whole surface again; new vertices came behind the old ones."""
+def _put_back(whole: Surface, apart: _Apart) -> Surface:
+    """The whole surface again; new vertices come behind the old ones."""
+    near, others, known = apart.near, apart.others, len(apart.vertices)
+    number = np.concatenate([apart.vertices, len(whole.vertices) + np.arange(len(near.vertices) - known)])
     return Surface(
-        near.vertices,
-        np.concatenate([others.faces, near.faces]),
-        np.concatenate([others.cad_face, near.cad_face]),
-        np.concatenate([others.labels, near.labels]),
-        np.concatenate([others.source, near.source]),
+        np.concatenate([whole.vertices, near.vertices[known:]]),
+        np.concatenate([whole.faces[others], number[near.faces]]),
+        np.concatenate([whole.cad_face[others], near.cad_face]),
+        np.concatenate([whole.labels[others], near.labels]),
+        np.concatenate([whole.source[others], near.source]),
     )
 
 

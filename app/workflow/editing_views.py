@@ -8,6 +8,7 @@ from sqlmodel import Session, select
 from app.errors import AppError, InvalidInput
 from app.geometry.pieces import Piece, piece_under
 from app.geometry.regions import warm_up
+from app.geometry.segmentation import SegmentationParameters
 from app.geometry.slicing import nearest_face
 from app.geometry.tool import Tool
 from app.storage import emit
@@ -128,7 +129,7 @@ def piece_faces(ctx: Context, session_id: str) -> np.ndarray | None:
 
 
 def get_ready(ctx: Context, tool_id: str) -> None:
-    """Do now what the first edit of a tool would wait for: its merge tree, and the kernels that measure regions."""
+    """Do now what the first edit of a tool would wait for: its merge tree and patches, and the kernels that measure regions."""
 
     def query(session: Session) -> tuple[Tool, tuple[str, str | None, str | None]]:
         row = present(session, ToolRow, tool_id)
@@ -139,6 +140,10 @@ def get_ready(ctx: Context, tool_id: str) -> None:
     if tool.graph.source == "mesh":
         warm_up()
         ctx.values.tree(tool, *names)
+        _, part_sha, tree_sha = names
+        part, tree = ctx.values.part(part_sha), ctx.values.part_tree(tree_sha)
+        if part_sha is not None and part is not None and tree is not None:
+            ctx.values.patches(part_sha, part, tree, SegmentationParameters())
 
 
 def follow_edit(values: Values, session: Session, row: ToolRow, after: After) -> None:

@@ -11,7 +11,7 @@ from app.geometry import editing
 from app.geometry.editing import Edited
 from app.geometry.grid import grid_size, grid_split
 from app.geometry.line_cut import cut_along_line
-from app.geometry.merge_tree import MergeTree
+from app.geometry.merge_tree import Integers, MergeTree
 from app.geometry.pieces import piece_under
 from app.geometry.slicing import Sliced, nearest_face
 from app.geometry.splitting import Surface
@@ -42,6 +42,7 @@ class After:
     locked: tuple[int, ...]
     hidden: tuple[int, ...]
     words: str
+    source: Integers | None = None  # (F,) face of before that each face is a part of; None when that isn't known
 
     @property
     def made(self) -> list[int]:
@@ -75,7 +76,7 @@ def _shaped(before: Before, edited: Edited, words: str | Callable[[Edited], str]
         raise InvalidInput(f"This would make {edited.tool.n} regions; a tool has at most {MOST_REGIONS}.")
     kept = tuple(int(a) for a in edited.kept)
     locked, hidden = (tuple(new for new, old in enumerate(kept) if old in marked) for marked in (before.locked, before.hidden))
-    return After(edited.tool, kept, locked, hidden, words if isinstance(words, str) else words(edited))
+    return After(edited.tool, kept, locked, hidden, words if isinstance(words, str) else words(edited), edited.source)
 
 
 def _merge(before: Before, edit: Json) -> After:

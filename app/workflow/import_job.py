@@ -100,9 +100,9 @@ def compute(order: Order, report: Report) -> Result:
     kept = MergeTree.from_bytes(order.tree) if order.tree else part_tree(part, lambda f: report(start + (0.6 - start) * f, words))
     tree = part_tree(part, denoise=True) if order.parameters.denoise else kept
     before = tool_from_bytes(order.tool) if order.tool else None
-    tool, locked = recut(part, order.parameters, tree, before, order.locked, lambda f, message: report(0.6 + 0.35 * f, message))
-    features = feature_set_for(tool.graph).name
-    return Result(part_to_bytes(part), kept.to_bytes(), tool_to_bytes(tool), locked, tool.n, features, part.report.lines)
+    made = recut(part, order.parameters, tree, before, order.locked, lambda f, message: report(0.6 + 0.35 * f, message))
+    tool, features = made.tool, feature_set_for(made.tool.graph).name
+    return Result(part_to_bytes(part), kept.to_bytes(), tool_to_bytes(tool), made.held, tool.n, features, part.report.lines)
 
 
 def finish(store: Store, session: Session, job: JobRow, result: Result) -> None:

@@ -10,8 +10,10 @@ from sqlmodel import Session, col, func, select
 
 from app.errors import Conflict, InvalidInput, StaleVersion
 from app.geometry.borders import FREE, find_borders
+from app.geometry.importing import ImportedPart
+from app.geometry.merge_tree import MergeTree
 from app.geometry.recutting import recut
-from app.geometry.segmentation import SegmentationParameters
+from app.geometry.segmentation import Patches, SegmentationParameters
 from app.geometry.tool import Tool
 from app.jobs.rows import unfinished_job
 from app.sequencing.features import feature_set_for
@@ -51,6 +53,8 @@ def edit_tool(ctx: Context, tool_id: str, edit: Json, segmentation_id: str | Non
         if shaped:
             features = feature_set_for(after.tool.graph).name
             cut = add_cut(session, ctx.store, row, content, after.tool.n, features, {"edit": edit})
+            tree = None if after.source is None else ctx.values.tree_after(parent.tool_sha, row.part_sha, after.source)
+            ctx.values.remember(after.tool, cut.tool_sha, row.part_sha, tree)
         else:
             cut = _same_regions(session, parent, after)
         _join_history(session, parent, cut, edit["kind"], after)
@@ -81,20 +85,22 @@ def recut_tool(ctx: Context, tool_id: str, parameters: Json, segmentation_id: st
     """
     known = SegmentationParameters(**parameters)
 
-    def value(session: Session) -> tuple[str, Before, Any, Any]:
+    def value(session: Session) -> tuple[str, Before, ImportedPart, MergeTree, Patches | None]:
         before_id, before = _before(ctx, session, tool_id, "cut", segmentation_id)
         row = present(session, ToolRow, tool_id)
         part, tree = ctx.values.part(row.part_sha), ctx.values.part_tree(row.tree_sha)
-        if part is None:
+        if part is None or row.part_sha is None:
             raise InvalidInput(f"{row.name} comes with its regions; only tools made from a CAD file can be cut anew.")
         if tree is None:
             raise Conflict(f"{row.name} was read in before its merges were kept. Cut it once in the background, then this works at once.")
-        if known.denoise and row.part_sha:
+        if known.denoise:
             tree = ctx.values.denoised_tree(row.part_sha)
-        return before_id, before, part, tree
+        patches = None if before.locked else ctx.values.patches(row.part_sha, part, tree, known)
+        return before_id, before, part, tree, patches
 
-    before_id, before, part, tree = ctx.store.read(value)
-    tool, held = recut(part, known, tree, before.tool, before.locked)
+    before_id, before, part, tree, patches = ctx.store.read(value)
+    made = recut(part, known, tree, before.tool, before.locked, patches=patches)
+    tool, held = made.tool, made.held
     kept = tuple(before.locked[held.index(a)] if a in held else -1 for a in range(tool.n))
     hidden = tuple(a for a, old in enumerate(kept) if old in before.hidden)
     after = After(tool, kept, tuple(held), hidden, f"Cut into {tool.n} regions")
@@ -104,6 +110,7 @@ def recut_tool(ctx: Context, tool_id: str, parameters: Json, segmentation_id: st
         row, parent = _editable(session, tool_id, "cut")
         _check_unchanged(row, parent, before_id)
         cut = add_cut(session, ctx.store, row, content, tool.n, feature_set_for(tool.graph).name, vars(known))
+        ctx.values.remember(tool, cut.tool_sha, row.part_sha, None if known.denoise else made.tree)
         replaced = parent if continues and parent.parent_id and _only_passed(session, parent) else None
         if replaced is not None:
             parent = found(session, Segmentation, replaced.parent_id or "", "segmentation")

@@ -10,9 +10,9 @@ from sqlmodel import Session, col, select
 
 from app.geometry.carry_over import RegionMap, map_regions
 from app.geometry.importing import ImportedPart
-from app.geometry.merge_tree import MergeTree
+from app.geometry.merge_tree import Integers, MergeTree
 from app.geometry.pieces import tree_for
-from app.geometry.segmentation import part_tree
+from app.geometry.segmentation import Patches, SegmentationParameters, find_patches, part_tree
 from app.geometry.tool import Tool
 from app.sequencing.features import FEATURE_SETS, FeatureSet, Interaction
 from app.sequencing.problem import SequencingProblem
@@ -41,6 +41,16 @@ class Kept:
             self._values.move_to_end(key)
             return self._values[key]
 
+    def put(self, key: Hashable, value: Any) -> None:
+        """Keep a value that came about elsewhere."""
+        with self._lock:
+            self.get(key, lambda: value)
+
+    def known(self, key: Hashable) -> Any | None:
+        """The value if it is kept."""
+        with self._lock:
+            return self._values.get(key)
+
 
 class Values:
     """Reads core values; what it keeps never changes, because segmentations don't."""
@@ -52,6 +62,7 @@ class Values:
         self.reports = Kept(KEPT_REPORTS)
         self._trees = Kept(KEPT_TREES)
         self._parts = Kept(KEPT_TREES)
+        self._patches = Kept(KEPT_TREES)
         self._maps = Kept(KEPT_MAPS)
 
     def tool(self, session: Session, segmentation: Segmentation) -> Tool:
@@ -73,6 +84,22 @@ class Values:
     def tree(self, tool: Tool, tool_sha: str, part_sha: str | None, tree_sha: str | None) -> MergeTree:
         """The merge tree on the triangles of a cut: the kept one of its part, or one made now."""
         return self._trees.get((tool_sha, part_sha), lambda: tree_for(tool, self.part(part_sha), self.part_tree(tree_sha)))
+
+    def remember(self, tool: Tool, tool_sha: str, part_sha: str | None, tree: MergeTree | None) -> None:
+        """Keep a cut that was just made, and the merge tree on its triangles where it came with it."""
+        self._tools.put(tool_sha, tool)
+        if tree is not None:
+            self._trees.put((tool_sha, part_sha), tree)
+
+    def tree_after(self, tool_sha: str, part_sha: str | None, source: Integers) -> MergeTree | None:
+        """The merge tree of a cut whose triangles are pieces of those of another one, if that one's tree is kept."""
+        tree: MergeTree | None = self._trees.known((tool_sha, part_sha))
+        return None if tree is None else tree.on(source)
+
+    def patches(self, part_sha: str, part: ImportedPart, tree: MergeTree, parameters: SegmentationParameters) -> Patches:
+        """What a part is made of before it is merged to the number of regions wanted."""
+        key = (part_sha, parameters.tolerance, parameters.denoise)
+        return self._patches.get(key, lambda: find_patches(part, parameters, tree))
 
     def part_tree(self, tree_sha: str | None) -> MergeTree | None:
         """The kept merge tree of a part; None for parts read in before it was kept, and tools without a part."""
