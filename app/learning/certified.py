@@ -23,7 +23,7 @@ from app.learning.many_optima import cheapest_orders, random_orders, sums_of
 from app.learning.performance_state import LearningDemonstration
 from app.learning.qp import Array, QuadraticProgram, solve
 from app.learning.version_space import Cone, cone_of, sample
-from app.sequencing.classes import class_size, equivalent_sequences
+from app.sequencing.classes import class_size, omega_size
 from app.sequencing.problem import SequencingProblem, check_sequence
 
 FEW = 8  # samples while cuts are still being found
@@ -251,8 +251,8 @@ def is_hit(demonstration: LearningDemonstration, weights: Array) -> bool:
     size = class_size(demonstration.problem, weights)
     if size <= HIT_SIZE:
         return True
-    omega = equivalent_sequences(demonstration.problem, demonstration.sequence, cap=size + 1) if size <= 4096 else None
-    return omega is not None and omega.complete and len(omega.sequences) == size
+    members, all_of_them = omega_size(demonstration.problem, demonstration.sequence)
+    return all_of_them and members == size
 
 
 def identifiable(frame: Frame, problems: Ordered[SequencingProblem]) -> tuple[bool, ...]:

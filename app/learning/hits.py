@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from app.learning.qp import Array
-from app.sequencing.classes import class_size, equivalent_sequences
+from app.sequencing.classes import class_size, omega_size
 from app.sequencing.comparison import kendall_tau
 from app.sequencing.problem import SequencingProblem
 from app.sequencing.shortest import shortest_sequence
@@ -48,5 +48,5 @@ def judge(problem: SequencingProblem, weights: Array, recorded: Sequence, predic
 
 def only_equivalents(problem: SequencingProblem, recorded: Sequence, size: int) -> bool:
     """Whether the class of that size holds nothing but orders with the recorded one's feature sum."""
-    omega = equivalent_sequences(problem, recorded, cap=size + 1)
-    return omega.complete and len(omega.sequences) == size
+    members, all_of_them = omega_size(problem, recorded)
+    return all_of_them and members == size

@@ -21,7 +21,7 @@ TOLERANCE = 1e-7  # relative: costs closer than this count as equal
 ROUNDING = 4e-6  # error of single-precision costs-to-go, as a share of the largest sum of absolute costs
 TOP_BITS = 8  # superblocks that threads share
 MOST_NODES = 2_000_000  # of the graph
-WIDEST = 20_000  # nodes per layer that are kept where there are more than MOST_NODES
+PART = 100  # where there are more, each layer keeps this part of them
 
 
 class Prepared(NamedTuple):
@@ -105,7 +105,7 @@ def answer(p: Prepared, w: Array, extra: Array, after: Array, v: Single, filled:
         limit = lowest_cost(form, after, v) + error
     first, region, cost, to, end, complete = explore_compiled(form, v, after, limit, most, 0)
     if not complete:
-        first, region, cost, to, end, _ = explore_compiled(form, v, after, limit, most, WIDEST)
+        first, region, cost, to, end, _ = explore_compiled(form, v, after, limit, most, most // PART)
     to_go = lowest_to_end(first, cost, to, end)
     scale = max(abs(to_go[0]) if np.isfinite(to_go[0]) else 0.0, 1e-3 * bound, 1e-300)
     ways = ways_to_end(first, cost, to, to_go, end, TOLERANCE * scale)[0]

@@ -29,12 +29,12 @@ from app.sequencing.relaxed_walk import Walk, cheapest_walk
 from app.sequencing.structure import Undeclared
 
 ROUNDING = 1e-9  # of the sum of all numbers involved: far more than float64 can lose
-STEPS = 1000  # of the subgradient method
+STEPS = 1200  # of the subgradient method
 COARSE, MIDDLE, FINE = 4000, 10_000, 30_000  # pairs of levels of the two sums: for most steps, for the rest, for the last bound
-REFINED = 0.25  # share of the steps with the middle tables
-PATIENCE = 25  # steps without gain before they are halved
+REFINED = 0.4  # share of the steps with the middle tables
+PATIENCE = 30  # steps without gain before they are halved
 TINY = 1e-3  # steps this small end the search
-KEPT = 0.9  # share of the direction before that goes on
+KEPT = 0.93  # share of the direction before that goes on
 EVEN = 10.0  # how much further prices of a pair go together at all positions than each for itself
 
 Report = Callable[[float], None]
@@ -136,8 +136,8 @@ def lower_bound(
     Args:
         problem: The tool and its features.
         w: Weights, shape (n + m,).
-        best: Cost of the best sequence known: what the steps aim at.
-        resolved: Constraints; the bound is for what comes after the finished regions.
+        best: Cost of the best sequence known, finished regions included: what the steps aim at.
+        resolved: Constraints.
         steps: Subgradient steps, each a new set of prices.
         should_stop: Asked after every step.
         report: Told every better bound.
@@ -148,14 +148,15 @@ def lower_bound(
     w, r = problem.check_weights(w), resolved or resolve(None, problem.n)
     if _unknown(problem, w):
         return -np.inf
+    spent = problem.cost_of(w, r.done)
     if not r.free:
-        return min(best, 0.0)
-    ascent = Ascent(split(problem, w, r), best, report)
+        return min(best, spent)
+    ascent = Ascent(split(problem, w, r), best - spent, lambda bound: report(bound + spent))
     for cells, share in ((COARSE, 1 - REFINED), (MIDDLE, REFINED)):
         if ascent.climb(cells, max(1, round(share * steps)), should_stop):
             break
     ascent.try_out(FINE)
-    return min(best, ascent.bound)
+    return min(best, ascent.bound + spent)
 
 
 def _unknown(problem: SequencingProblem, w: Array) -> bool:

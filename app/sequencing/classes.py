@@ -4,22 +4,21 @@ Symmetric tools have many equally cheap sequences, so the K cheapest sequences a
 learner asks about classes instead, each with the number of its members.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 
 from app.geometry.tool import Array
-from app.sequencing.comparison import kendall_tau
-from app.sequencing.constraints import Constraints, check_order, resolve
+from app.sequencing.constraints import Constraints, Resolved, check_order, resolve
 from app.sequencing.forms import step_costs
 from app.sequencing.nearly import Nearly, explore
-from app.sequencing.omega import equal_sums, equal_sums_searched
-from app.sequencing.problem import EXACT_LIMIT, TENSOR_LIMIT, SequencingProblem, check_sequence
+from app.sequencing.omega import drawn_members, equal_sums, one_per_ends
+from app.sequencing.problem import SequencingProblem, check_sequence
 from app.sequencing.shortest import TOLERANCE, Solution, reason_against, shortest_sequence, solve
 
 CAP = 256  # members of a class that are listed
+POOL = 1000  # members drawn to choose unlike ones from
 FIRST_REACH = 4  # of the costs one step beside the cheapest sequence, which one the first search for classes reaches to
 CLASS_NODES = 400_000  # of the graph that classes are counted in
 
@@ -39,6 +38,9 @@ class Equivalents:
 
     sequences: tuple[tuple[int, ...], ...]
     complete: bool  # these are all
+    count: int  # members
+    counted: bool  # False: there may be more than `count`
+    every_end: bool = False  # some member is listed for every first and last region that members have
 
 
 def best_classes(
@@ -142,8 +144,9 @@ def optimal_sequences(problem: SequencingProblem, w: Array, cap: int = CAP, cons
     if not reason_against(problem, resolved):
         solution = solve(problem, w, resolved)
         found = tuple(solution.named(s) for s in solution.graph.members(solution.tolerance, cap))
-        return Equivalents(found, complete=solution.graph.complete and len(found) == solution.ties)
-    return Equivalents((shortest_sequence(problem, w, constraints=constraints).sequence,), complete=False)
+        whole = solution.graph.complete
+        return Equivalents(found, whole and len(found) == solution.ties, solution.ties, whole)
+    return Equivalents((shortest_sequence(problem, w, constraints=constraints).sequence,), complete=False, count=1, counted=False)
 
 
 def class_size(problem: SequencingProblem, w: Array, constraints: Constraints | None = None) -> int:
@@ -157,35 +160,60 @@ def equivalent_sequences(
 ) -> Equivalents:
     """Omega: all sequences with the same feature sum, so the same cost under any weights (Eq. 3).
 
-    The given sequence comes first, then the others with the lowest ids first. Complete for at most 20 regions unless the
-    cap (or, above 14, the search limit) was reached; above 20 regions only exchanges of two regions are looked at. With
-    constraints, only those that respect them; regions can't be skipped here, because sums over other regions never compare.
+    The given sequence comes first. All others follow, lowest ids first, when they fit under the cap; else a sample as unlike as
+    possible: first one member for each first and last region that members have, then those farthest from what is listed. The
+    count is exact to `omega.MOST_REGIONS` regions; above, only exchanges of two regions are looked at. With constraints, only
+    members that respect them; regions can't be skipped here, because sums over other regions never compare.
     """
     order, resolved = check_sequence(sequence, problem.n), resolve(constraints, problem.n)
-    if problem.n <= TENSOR_LIMIT and not problem.last:
-        found, complete = equal_sums(problem, order, cap)
-    elif problem.n <= EXACT_LIMIT and not problem.last:
-        found, complete = equal_sums_searched(problem, order, cap)
-    else:
-        total = problem.feature_sum(order)
-        found = [s for s in sorted(neighbours(order)) if np.allclose(problem.feature_sum(s), total, rtol=1e-9, atol=1e-9)]
-        complete = False
-    others = [s for s in found if s != order and s[: len(resolved.done)] == resolved.done and not check_order(s, resolved)]
-    return Equivalents((order, *others)[:cap], complete)
+    if resolved.skip or order[: len(resolved.done)] != resolved.done or check_order(order, resolved):
+        return Equivalents((order,), complete=False, count=1, counted=False)
+    graph = equal_sums(problem, order, resolved)
+    if graph is None:
+        return _equal_nearby(problem, order, resolved)
+    count, known = graph.count(0.0), {order: None}
+
+    def add(members: Iterable[tuple[int, ...]]) -> None:
+        known.update((resolved.done + tuple(resolved.free[a] for a in m), None) for m in members)
+
+    if count <= cap:
+        add(graph.members(0.0, cap))
+        return Equivalents(tuple(known), graph.complete, count, graph.complete, every_end=graph.complete)
+    add(one_per_ends(graph))
+    ends = list(known)[:cap]
+    every_end = graph.complete and len(ends) == len(known)
+    add(drawn_members(graph, POOL))
+    return Equivalents(diverse(tuple(known), cap, len(ends)), complete=False, count=count, counted=graph.complete, every_end=every_end)
 
 
-def diverse(sequences: Sequence[tuple[int, ...]], k: int) -> tuple[tuple[int, ...], ...]:
-    """k of the sequences as unlike each other as a greedy choice finds: the farthest pair, then always the one farthest from
-    its nearest chosen one (Kendall's tau); ties by position."""
+def _equal_nearby(problem: SequencingProblem, order: tuple[int, ...], resolved: Resolved) -> Equivalents:
+    """Members that differ by one exchange."""
+    total, done = problem.feature_sum(order), len(resolved.done)
+    near = [s for s in sorted(neighbours(order)) if s[:done] == order[:done] and not check_order(s, resolved)]
+    others = [s for s in near if np.allclose(problem.feature_sum(s), total, rtol=1e-9, atol=1e-9)]
+    return Equivalents((order, *others), complete=False, count=1 + len(others), counted=False)
+
+
+def omega_size(problem: SequencingProblem, sequence: Sequence[int]) -> tuple[int, bool]:
+    """Number of sequences with the same feature sum, and whether these are all."""
+    order = check_sequence(sequence, problem.n)
+    graph = equal_sums(problem, order, resolve(None, problem.n))
+    return (graph.count(0.0), graph.complete) if graph else (1, False)
+
+
+def diverse(sequences: Sequence[tuple[int, ...]], k: int, given: int = 0) -> tuple[tuple[int, ...], ...]:
+    """k of the sequences as unlike each other as a greedy choice finds: the first `given` of them, or else the farthest pair,
+    then always the one farthest from its nearest chosen one (Kendall's tau); ties by position."""
     pool = list(dict.fromkeys(sequences))
     if k >= len(pool):
         return tuple(pool)
     if k == 1:
         return (pool[0],)
-    alike = np.eye(len(pool))
-    for i, j in combinations(range(len(pool)), 2):
-        alike[i, j] = alike[j, i] = kendall_tau(pool[i], pool[j])
-    chosen = [int(i) for i in np.unravel_index(int(alike.argmin()), alike.shape)]
+    place = np.argsort(np.array(pool), axis=1)
+    one, two = np.triu_indices(place.shape[1], 1)
+    ahead = np.where(place[:, one] < place[:, two], 1.0, -1.0)
+    alike = ahead @ ahead.T / max(len(one), 1)  # Kendall's tau of every two
+    chosen = list(range(min(given, k))) or [int(i) for i in np.unravel_index(int(alike.argmin()), alike.shape)]
     while len(chosen) < k:
         nearest = alike[:, chosen].max(axis=1)
         nearest[chosen] = np.inf

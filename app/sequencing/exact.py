@@ -50,8 +50,8 @@ class Model:
 
 def bytes_needed(problem: SequencingProblem, n: int) -> float:
     """Memory of the tables for n regions still to be ordered: costs-to-go, values of sets, undeclared columns."""
-    per_set = problem.kept.setdefault(("bytes", n), None) or _bytes_per_set(problem, n)
-    problem.kept["bytes", n] = per_set
+    per_set = problem.kept.get(f"bytes {n}") or _bytes_per_set(problem, n)
+    problem.kept[f"bytes {n}"] = per_set
     return 2.0**n * per_set
 
 

@@ -127,7 +127,7 @@ def compose(declarations: tuple[Declaration, ...], n: int, free: tuple[int, ...]
     own = np.array(steps.kept, np.float64).reshape(-1, n + 1)
     passed = np.concatenate([tests[..., past].any(axis=-1), np.ones((len(tests), 1, n), np.bool_)], axis=1)
     shape = Shape(
-        start=(start + change[:, :, past].sum(axis=2))[:, keep],
+        start=np.ascontiguousarray((start + change[:, :, past].sum(axis=2))[:, keep]),
         change=_square(change, keep),
         tests=_square(tests, keep),
         reached=passed.argmax(axis=1)[:, keep],

@@ -55,7 +55,7 @@ def after_last(features: tuple[LastFeature, ...], w: Array, resolved: Resolved) 
     for weight, f in zip(w, features, strict=True):
         between, start = between + weight * f.between, start + weight * f.start
     row = between[resolved.done[-1]] if resolved.done else start
-    return np.concatenate([between[np.ix_(free, free)], row[None, free]])
+    return np.ascontiguousarray(np.concatenate([between[np.ix_(free, free)], row[None, free]]))  # compiled code takes no other
 
 
 @nb.njit(cache=True, nogil=True)

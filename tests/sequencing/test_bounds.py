@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from app.geometry.tool import GraphSource
 from app.sequencing.bounds import Prices, evaluate, lower_bound, no_prices
 from app.sequencing.constraints import Constraints, check_order, resolve
+from app.sequencing.exact import Limits
 from app.sequencing.features import FEATURE_SETS, Interaction
 from app.sequencing.last import travel
 from app.sequencing.parts import split
@@ -60,18 +61,25 @@ def test_below_what_constraints_leave(seed: int, source: GraphSource):
     w, resolved = weights(problem, seed, True), resolve(Constraints(before=((a, b),), last=c, skip=(d,), done=(e, f)), 7)
     free = [x for x in range(7) if x not in (d, e, f)]
     orders = [rest for rest in itertools.permutations(free) if not check_order((e, f, *rest), resolved)]
-    best = min(rest_cost(problem, w, (e, f), rest) for rest in orders)
+    best = min(problem.cost_of(w, (e, f, *rest)) for rest in orders)
     assert lower_bound(problem, w, best + 1.0, resolved, steps=25) <= best + 1e-9
 
 
-def rest_cost(problem: SequencingProblem, w: np.ndarray, past: tuple[int, ...], rest: tuple[int, ...]) -> float:
-    """Cost of the steps after the finished regions."""
-    done, total = np.zeros((1, problem.n), np.bool_), 0.0
-    done[0, list(past)] = True
-    for a in rest:
-        total += float(problem.values(done)[0, a] @ w)
-        done[0, a] = True
-    return total
+@given(st.integers(0, 10_000), sources)
+@settings(max_examples=6, deadline=None)
+def test_what_is_said_of_an_order_that_is_not_proved_is_true(seed: int, source: GraphSource):
+    """As on a large tool: the optimum under all kinds of wishes lies between the bound and the cost of the order found."""
+    rng, graph = np.random.default_rng(seed), grid_graph(1, 7, seed, source)
+    a, b, c, d, e, f, g = rng.permutation(7).tolist()
+    problem = SequencingProblem(graph, problem_for(graph).features, (), (travel(rng.normal(size=(7, 3))),))
+    wishes = Constraints(before=((a, b),), never_next=((b, c), (e, c)), skip=(f,), done=(g, e))
+    w, resolved = weights(problem, seed, bool(seed % 2)), resolve(wishes, 7)
+    found = shortest_sequence(problem, w, constraints=wishes, limits=Limits(regions=0))
+    bound = lower_bound(problem, w, found.cost, resolved, steps=60)
+    orders = [(g, e, *rest) for rest in itertools.permutations((a, b, c, d)) if not check_order((g, e, *rest), resolved)]
+    best = min(problem.cost_of(w, order) for order in orders)
+    assert not found.proved
+    assert bound - 1e-9 <= best <= found.cost + 1e-9
 
 
 @pytest.mark.parametrize(("source", "most"), [("mesh", 0.1), ("synthetic", 0.2), ("real", 0.2)])

@@ -1,5 +1,6 @@
 """Cost classes and Omega against every order."""
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -9,8 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.geometry.tool import GraphSource
-from app.sequencing.classes import best_classes, class_size, equivalent_sequences, optimal_sequences
-from app.sequencing.omega import equal_sums, equal_sums_searched
+from app.sequencing.classes import best_classes, class_size, equivalent_sequences, omega_size, optimal_sequences
+from app.sequencing.constraints import Constraints, check_order, resolve
+from app.sequencing.features import FEATURE_SETS
+from app.sequencing.last import regripping
 from app.sequencing.problem import SequencingProblem, problem_for
 from app.sequencing.shortest import shortest_sequence
 from tests.sequencing.graphs import every_order, grid_graph
@@ -69,6 +72,7 @@ def test_omega_equals_brute_force(shape: tuple[int, int], seed: int | None, sour
     assert found.complete
     assert found.sequences[0] == sequence
     assert sorted(found.sequences) == same_sum(problem, sequence)
+    assert (found.count, found.counted) == (len(found.sequences), True)
 
 
 def test_symmetric_tools_have_more_than_one_member():
@@ -88,22 +92,56 @@ def test_nearly_equal_sums_are_not_equal():
     assert len(members) < len(equivalent_sequences(problem_for(graph), best).sequences)
 
 
-def test_cap_is_told_and_keeps_the_given_sequence():
-    problem = problem_for(grid_graph(2, 3, None))
-    sequence = next(s for s in every_order(problem)[0][::-1] if len(same_sum(problem, s)) > 2)
-    found = equivalent_sequences(problem, sequence, cap=2)
-    assert not found.complete
-    assert len(found.sequences) == 2
-    assert found.sequences[0] == sequence
-    exact = equivalent_sequences(problem, sequence, cap=len(same_sum(problem, sequence)))
-    assert exact.complete
-
-
 @pytest.mark.parametrize("seed", [None, 3])
-def test_search_without_a_table_agrees_with_the_table(seed: int | None):
+def test_omega_of_eight_regions_equals_brute_force(seed: int | None):
     problem = problem_for(grid_graph(2, 4, seed))
     sequence = shortest_sequence(problem, np.ones(13)).sequence
-    assert equal_sums_searched(problem, sequence, 100) == equal_sums(problem, sequence, 100)
+    assert sorted(equivalent_sequences(problem, sequence).sequences) == same_sum(problem, sequence)
+
+
+def all_alike(regions: int) -> SequencingProblem:
+    """One column that only looks at the first region, so that orders with the same start have the same sum."""
+    layout = FEATURE_SETS["layout"]
+    return SequencingProblem(grid_graph(1, regions, 1), replace(layout, columns=layout.columns[8:9], factors={}), ())
+
+
+def test_above_the_cap_omega_is_counted_and_the_sample_has_every_start_and_end():
+    problem, order = all_alike(7), tuple(range(7))
+    start = problem.tensor()[0, :, 0]
+    expected = math.factorial(6) * int((np.abs(start - start[0]) < 1e-9).sum())
+    found = equivalent_sequences(problem, order, cap=60)
+    assert (found.count, found.counted, found.complete) == (expected, True, False)
+    assert len(set(found.sequences)) == 60
+    assert found.sequences[0] == order
+    assert {(s[0], s[-1]) for s in found.sequences} == {(a, b) for a in range(7) for b in range(7) if a != b and start[a] == start[0]}
+    assert found.every_end
+    assert not equivalent_sequences(problem, order, cap=3).every_end
+    assert omega_size(problem, order) == (expected, True)
+
+
+def test_what_was_dropped_is_told_and_the_given_sequence_kept(monkeypatch: pytest.MonkeyPatch):
+    problem, order = all_alike(7), (0, 4, 2, 6, 1, 3, 5)
+    monkeypatch.setattr("app.sequencing.omega.WIDEST", 5)
+    found = equivalent_sequences(problem, order)
+    assert not found.counted
+    assert not found.complete
+    assert 1 < found.count < math.factorial(6)
+    assert found.sequences[0] == order
+
+
+@given(st.integers(0, 10_000), st.booleans())
+@settings(max_examples=8, deadline=None)
+def test_omega_with_wishes_and_grips_equals_brute_force(seed: int, grips: bool):
+    base, rng = grid_graph(2, 3, None), np.random.default_rng(seed)
+    last = (regripping(rng.integers(0, 2, 6)),) if grips else ()
+    problem = SequencingProblem(base, FEATURE_SETS["clean"], (), last)
+    order = tuple(int(a) for a in rng.permutation(6))
+    pair = tuple(int(a) for a in rng.choice(6, 2, replace=False))
+    wish = Constraints(before=((order[0], order[3]),), never_next=(pair,) if pair not in itertools.pairwise(order) else (), done=order[:1])
+    total = problem.feature_sum(order)
+    same = [o for o in itertools.permutations(range(6)) if np.allclose(problem.feature_sum(o), total, rtol=0, atol=1e-9)]
+    allowed = [o for o in same if o[0] == order[0] and not check_order(o, resolve(wish, 6))]
+    assert sorted(equivalent_sequences(problem, order, constraints=wish).sequences) == sorted(allowed)
 
 
 def test_optimal_sequences_are_all_and_only_the_cheapest():
@@ -127,7 +165,7 @@ def test_scaling_weights_scales_costs_and_keeps_classes():
 
 
 def test_large_tools_report_what_was_looked_at():
-    problem, w = problem_for(grid_graph(3, 7, 1)), np.random.default_rng(1).normal(size=13)
+    problem, w = problem_for(grid_graph(3, 8, 1)), np.random.default_rng(1).normal(size=13)
     classes = best_classes(problem, w, 5)
     assert [c.cost for c in classes] == sorted(c.cost for c in classes)
     assert classes[0].cost <= shortest_sequence(problem, w).cost

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.geometry.tool import GraphSource
-from app.sequencing import answer, block, forms, gaps, kernels, nearly, warming
+from app.sequencing import answer, block, gaps, nearly, warming
 from app.sequencing.classes import equivalent_sequences
 from app.sequencing.comparison import kendall_tau
 from app.sequencing.large import best_found
@@ -91,7 +91,7 @@ def test_kendall_tau():
 
 
 def test_warm_up_compiles_what_a_search_uses():
-    used = (block.fill, nearly.explore_compiled, nearly.ways_to_end, forms.weigh, answer.magnitude, kernels.members_within, gaps.box_gaps)
+    used = (answer.answer, answer.weighed, answer.laid_out, block.fill, nearly.ways_to_end, nearly.lowest_to_end, gaps.box_table)
     warming.warm_up()
     before = {k: len(k.signatures) for k in used}
     assert all(before.values())
