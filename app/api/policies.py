@@ -5,9 +5,11 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Response
 from pydantic import Field
 
-from app.api.dependencies import Body, Ctx, Json, Paging, RegionOrder, Row, located, page
+from app.api.dependencies import Body, Ctx, Json, Paging, RegionOrder, Row, Seed, located, page
 from app.api.idempotency import ActionRoute, IdempotencyKey
+from app.api.runs import Run
 from app.sequencing.constraints import Constraints
+from app.workflow import doubts
 from app.workflow import policies as workflow
 
 router = APIRouter(tags=["policies"], route_class=ActionRoute)
@@ -85,6 +87,21 @@ class NewPlan(Body):
     constraints: OrderConstraints | None = None
 
 
+class Doubt(Body):
+    """The tool whose order is doubted."""
+
+    tool_id: Annotated[str, Field(max_length=64)]
+    seed: Seed | None = None
+
+
+class WantedOrder(Row):
+    """The order an expert wants on one tool, instead of the policy's."""
+
+    answers: int
+    probability: float  # given the answers; 1: the expert said that it is theirs
+    extra: float  # cost above the policy's cheapest order
+
+
 class WhatIf(Body):
     """Another order of the same tool."""
 
@@ -127,6 +144,7 @@ class Plan(Row):
     milliseconds: float
     effort: float | None
     tie_settled_by: str | None
+    exception: WantedOrder | None = None
     constraints: dict[str, Any] | None = None  # what the order respects, as asked
     features: list[PlanFeature]
     steps: list[PlanStep]
@@ -178,6 +196,18 @@ def list_plans(ctx: Ctx, policy_id: str, paging: Paging) -> PlanPage:
 def make_plan(ctx: Ctx, policy_id: str, body: NewPlan, response: Response, _key: IdempotencyKey = None) -> Json:
     """The lowest-cost sequence for a tool."""
     return located(response, "plans", workflow.make_plan(ctx, policy_id, body.tool_id, body.constraints and body.constraints.value()))
+
+
+@router.post("/policies/{policy_id}/questions", status_code=202, response_model=Run)
+def ask_about(ctx: Ctx, policy_id: str, body: Doubt, response: Response, _key: IdempotencyKey = None) -> Json:
+    """Ask the expert about one tool whose order they doubt: at most three questions, then an order for that tool."""
+    return located(response, "runs", doubts.ask_about(ctx, policy_id, body.tool_id, body.seed))
+
+
+@router.delete("/tools/{tool_id}/exception", status_code=204)
+def drop_exception(ctx: Ctx, tool_id: str) -> None:
+    """Let the policy decide on the tool again."""
+    doubts.drop_exception(ctx, tool_id)
 
 
 @router.get("/plans/{plan_id}", response_model=Plan)

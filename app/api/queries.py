@@ -45,7 +45,7 @@ class ExpertQuery(Row):
     id: str
     run_id: str
     project_id: str
-    kind: Literal["similarity", "preference", "pair"]
+    kind: Literal["similarity", "preference", "pair", "closer"]
     state: State
     tool_id: str
     tool_name: str
@@ -71,7 +71,7 @@ class QueryPage(Row):
 class NewAnswer(Body):
     """One of the query's choices."""
 
-    value: Literal["similar", "not_similar", "cant_tell", "left", "right", "equal", "both_wrong"]
+    value: Literal["similar", "not_similar", "cant_tell", "left", "right", "equal", "both_wrong", "left_mine", "right_mine"]
 
 
 class Answer(Row):

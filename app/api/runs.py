@@ -52,7 +52,7 @@ class Run(Row):
 
     id: str
     project_id: str
-    kind: Kind
+    kind: Literal["performance", "effort", "exception"]
     authors: list[str]  # where there are several experts
     mode: Mode | None
     state: str
@@ -72,6 +72,8 @@ class Run(Row):
     error: Json | str | None
     report: Json | None  # certified: what is proved, and how sure each tool is
     tools: list[str]
+    about: str | None  # exception: the tool it asks about
+    to_show: list[Json]  # certified: tools whose order it waits for, since both orders of a question were wrong
     version: int
     created_at: str
     updated_at: str

@@ -60,7 +60,8 @@ def candidates_for(problem: SequencingProblem, learned: Generalised, generator: 
         learned: From the demonstrations of other tools.
         generator: For the draws.
     """
-    problem = on_features(problem, FEATURE_SETS[learned.policy.features])
+    own = problem.features  # perhaps with features switched off or added
+    problem = on_features(problem, own if own.name == learned.policy.features else FEATURE_SETS[learned.policy.features])
     unit = np.where(learned.policy.identifiable, 1 / learned.scale, 0.0)
     values = np.ascontiguousarray(problem.tensor() * unit)
     root = np.linalg.cholesky(learned.fit.covariance)
@@ -107,7 +108,7 @@ def after_answer(candidates: Candidates, pair: tuple[int, int], reply: Reply) ->
 
     "left_mine" and "right_mine" are taken at their word; of the others one in `SLIP` may be a mistake.
     """
-    asked = candidates.asked | {pair}
+    asked = candidates.asked | {(min(pair), max(pair))}
     if reply == "cant_tell":
         return replace(candidates, asked=asked)
     expected = _expected(candidates.distance, pair[0], np.array(pair[1:]))[0]

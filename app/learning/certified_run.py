@@ -83,7 +83,7 @@ def start_certified(demonstrations: Demonstrations, tools: Tools, parameters: Ce
         InvalidInput: The tools differ in their features.
     """
     pool_for(demonstrations, _prior(parameters), tools)
-    return CertifiedState(seed, _identity(demonstrations, tools))
+    return CertifiedState(seed, _identity(demonstrations, tools), count=len(demonstrations))
 
 
 def certified_step(
@@ -98,7 +98,7 @@ def certified_step(
     """Learn from all that is known and ask what is open; pure and deterministic.
 
     Args:
-        demonstrations: The ones the run was started with, in the same order.
+        demonstrations: The ones the run was started with, in the same order, then those recorded for it since.
         tools: The tools of interest it was started with, in the same order.
         parameters: How to decide.
         state: As the last step returned it.
@@ -109,7 +109,7 @@ def certified_step(
     Returns:
         New state, and questions or the end of the run.
     """
-    if state.demonstrations != _identity(demonstrations, tools):
+    if state.demonstrations != _identity(demonstrations[: state.count or None], tools):
         raise InvalidInput("The demonstrations are not the ones this run was started with; start a new run.")
     given = tuple((q.fingerprint, answers[q.fingerprint]) for q in state.asked if q.fingerprint in answers)
     memory = memory or Memory.empty()

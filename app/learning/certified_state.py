@@ -100,6 +100,7 @@ class CertifiedState:
     phase: str = "training"  # "training" | "questions" | "converged" | "infeasible"
     weights: tuple[float, ...] = ()  # (k,)
     steps: int = 0
+    count: int = 0  # of the demonstrations the run started with; those recorded for it since come behind them. 0: all
 
     def to_json(self) -> dict[str, Any]:
         """Plain JSON values; floats survive bit for bit."""

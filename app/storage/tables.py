@@ -185,7 +185,7 @@ class Run(SQLModel, table=True):
     """A learner's life."""
 
     __table_args__ = (
-        one_of("kind", "performance", "effort"),
+        one_of("kind", "performance", "effort", "exception"),
         one_of("mode", "certified", "paper"),
         one_of("state", *RUN_STATES),
         CheckConstraint("round >= 0 AND iteration >= 0 AND seed >= 0", name="counts"),
@@ -204,7 +204,7 @@ class Run(SQLModel, table=True):
     interactions: list[dict[str, str]] = json_column()
     features: str | None = None  # name of the feature set; None on runs of earlier versions: that of the demonstrated tools
     checkpoint: int = 0  # number of the current checkpoint, 0 before the first
-    based_on: str | None = None  # effort: the performance policy
+    based_on: str | None = None  # effort: the performance policy; exception: the policy that is doubted
     policy_id: str | None = None
     message: str = ""
     error: Json | None = json_column(nullable=True)
@@ -253,7 +253,7 @@ class Query(SQLModel, table=True):
     """A stored question."""
 
     __table_args__ = (
-        one_of("kind", "similarity", "preference", "pair"),
+        one_of("kind", "similarity", "preference", "pair", "closer"),
         one_of("state", "open", "answered", "withdrawn"),
         Index("uq_query_fingerprint", "run_id", "fingerprint", unique=True),
     )
@@ -280,7 +280,7 @@ class Answer(SQLModel, table=True):
     """A reply; never changed. Taking one back adds a row with the value "undone" that supersedes it."""
 
     __table_args__ = (
-        one_of("value", "similar", "not_similar", "cant_tell", "left", "right", "equal", "both_wrong", "undone"),
+        one_of("value", "similar", "not_similar", "cant_tell", "left", "right", "equal", "both_wrong", "left_mine", "right_mine", "undone"),
         Index("uq_answer_current", "query_id", unique=True, sqlite_where=text("superseded_by IS NULL")),
     )
     id: str = Field(default_factory=new_id, primary_key=True)
@@ -309,6 +309,22 @@ class PolicyRow(SQLModel, table=True):
     certificate: Json | None = json_column(nullable=True)  # of a certified run: its last report
     learned_from: dict[str, int] = json_column()  # {demonstrations, answers}
     created_at: str = Field(default_factory=now)
+
+
+class ToolException(SQLModel, table=True):
+    """The order an expert wants on one tool, found by questions about it; the newest that wasn't dropped counts."""
+
+    __tablename__ = "tool_exception"  # pyright: ignore[reportAssignmentType]
+    id: str = Field(default_factory=new_id, primary_key=True)
+    project_id: str = owned("project.id")
+    tool_id: str = owned("tool.id")
+    segmentation_id: str = owned("segmentation.id")
+    run_id: str = owned("run.id")
+    sequence: list[int] = json_column()
+    answers: int
+    probability: float  # given the answers; 1: the expert said that it is theirs
+    created_at: str = Field(default_factory=now)
+    dropped_at: str | None = None
 
 
 class Plan(SQLModel, table=True):

@@ -14,6 +14,7 @@ from app.workflow.carry_over import carried_over, standing_of
 from app.workflow.context import Context
 from app.workflow.lookup import check_version, found, present, ready_segmentation
 from app.workflow.project_rows import checked_name
+from app.workflow.shown_orders import take_up
 from app.workflow.values import Values
 
 Json = dict[str, Any]
@@ -84,6 +85,7 @@ def add_demonstration(
     session.add(row)
     session.flush()
     _supersede_others(session, row)
+    take_up(session, row)
     _tell(session, row)
     return row
 

@@ -3,14 +3,14 @@
 import math
 import time
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
 from sqlmodel import Session, col, select
 
 from app.errors import IncompleteSequence
-from app.learning.effort_features import ALL_COLUMNS
+from app.learning.effort_features import ALL_COLUMNS, effort_penalty
 from app.learning.policy import Policy
 from app.learning.prediction import Prediction, predict
 from app.sequencing.constraints import Constraints, resolve
@@ -20,6 +20,7 @@ from app.sequencing.shortest import gap_between
 from app.storage import emit
 from app.storage.tables import Plan, PolicyRow, Project, Segmentation, ToolRow
 from app.workflow.context import Context
+from app.workflow.exceptions import standing_exception
 from app.workflow.feature_choice import ANY_TOOL, stored_features
 from app.workflow.lookup import found, present, ready_segmentation, standing
 from app.workflow.values import interactions_from
@@ -53,7 +54,7 @@ def policy_value(row: PolicyRow) -> Policy:
 
 
 def make_plan(ctx: Context, policy_id: str, tool_id: str, constraints: Constraints | None = None) -> Json:
-    """The lowest-cost sequence for a tool, computed now.
+    """The lowest-cost sequence for a tool, computed now; the expert's own order where the tool has one and nothing else is asked for.
 
     Raises:
         ContradictoryConstraints: The constraints on the order can't hold together; names them.
@@ -64,6 +65,10 @@ def make_plan(ctx: Context, policy_id: str, tool_id: str, constraints: Constrain
     started = time.perf_counter()
     prediction = predict(problem, policy_of_plan, _deadline(BOUND_SECONDS), constraints)
     milliseconds = 1000 * (time.perf_counter() - started)
+    wanted = None if constraints is not None and constraints != Constraints() else _exception(ctx, cut_id)
+    if wanted is not None:
+        cheapest, prediction = prediction.cost, _wanted(problem, policy_of_plan, prediction, tuple(wanted["sequence"]))
+        wanted = {**wanted, "extra": prediction.cost - cheapest}
 
     def change(session: Session) -> Json:
         policy = found(session, PolicyRow, policy_id, "policy")
@@ -74,7 +79,7 @@ def make_plan(ctx: Context, policy_id: str, tool_id: str, constraints: Constrain
             tool_id=tool_id,
             segmentation_id=cut_id,
             sequence=[int(a) for a in prediction.sequence],
-            result=_result(prediction, milliseconds) | {"constraints": asdict(constraints) if constraints else None},
+            result=_result(prediction, milliseconds) | {"constraints": asdict(constraints) if constraints else None, "exception": wanted},
         )
         session.add(row)
         session.flush()
@@ -82,6 +87,34 @@ def make_plan(ctx: Context, policy_id: str, tool_id: str, constraints: Constrain
         return plan_json(ctx, session, row)
 
     return ctx.store.write(change)
+
+
+def _exception(ctx: Context, cut_id: str) -> Json | None:
+    """The order an expert wants on these regions."""
+
+    def query(session: Session) -> Json | None:
+        row = standing_exception(session, found(session, Segmentation, cut_id, "segmentation"))
+        return None if row is None else {"sequence": row.sequence, "answers": row.answers, "probability": row.probability}
+
+    return ctx.store.read(query)
+
+
+def _wanted(problem: SequencingProblem, policy: Policy, cheapest: Prediction, order: tuple[int, ...]) -> Prediction:
+    """The expert's own order with its cost under the policy."""
+    parts = problem.steps_of(order) * policy.weights
+    effort = None if policy.effort_weights is None else effort_penalty(problem, policy.effort_weights, order)
+    method = "your answers about this tool"
+    return replace(
+        cheapest,
+        sequence=order,
+        cost=float(parts.sum()),
+        ties=1,
+        proved=False,
+        method=method,
+        effort=effort,
+        step_parts=parts,
+        tie_settled_by=None,
+    )
 
 
 def get_plan(ctx: Context, plan_id: str) -> Json:
@@ -178,6 +211,7 @@ def plan_json(ctx: Context, session: Session, row: Plan) -> Json:
         **{key: row.result[key] for key in ("cost", "ties", "proved", "method", "effort", "tie_settled_by", "milliseconds")},
         **_sureness(row.result),
         "constraints": row.result.get("constraints"),
+        "exception": row.result.get("exception"),
         "orders": f"{math.factorial(len(row.sequence)):,}",
         "features": [{"key": c.key, "label": c.label, "symbol": c.symbol} for c in _columns(session, policy)],
         "steps": [
@@ -201,7 +235,9 @@ def _sureness(result: Json) -> Json:
     gap = None if bound is None else gap_between(result["cost"], bound)
     if gap is not None and not math.isfinite(gap):
         gap = None
-    return {"bound": bound, "gap": gap, "sureness": sureness_words(cost=result["cost"], proved=result["proved"], bound=bound)}
+    own = result.get("exception") is not None
+    words = "Your order for this tool" if own else sureness_words(cost=result["cost"], proved=result["proved"], bound=bound)
+    return {"bound": bound, "gap": gap, "sureness": words}
 
 
 def sureness_words(cost: float, proved: bool, bound: float | None) -> str:

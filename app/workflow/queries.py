@@ -9,6 +9,7 @@ from app.jobs.rows import cancel_jobs
 from app.storage import emit
 from app.storage.tables import ACTIVE_RUN_STATES, Answer, Demonstration, Metric, Project, Query, Run, RunCheckpoint, ToolRow
 from app.workflow.context import Context
+from app.workflow.exceptions import forget
 from app.workflow.lookup import active_run, check_tools, found, present
 from app.workflow.run_rows import current_answer, go, open_queries, store_answer, train_on, withdraw
 
@@ -18,6 +19,7 @@ TITLES = {
     "similarity": "Would the right order be just as good as yours?",
     "preference": "Which of these two orders is less effort for you?",
     "pair": "Which of these two orders would you work in?",
+    "closer": "Which of these two comes closer to how you would do this tool?",
 }
 CHOICES: dict[str, list[Json]] = {
     "similarity": [
@@ -39,9 +41,18 @@ CHOICES["pair"] = [
     {"value": "both_wrong", "label": "Both are wrong", "hint": "I would show another order", "key": "4"},
     {"value": "cant_tell", "label": "Can't tell", "hint": "", "key": "0"},
 ]
+CHOICES["closer"] = [
+    {"value": "left_mine", "label": "The left one is my way", "hint": "it counts for this tool", "key": "1"},
+    {"value": "right_mine", "label": "The right one is my way", "hint": "it counts for this tool", "key": "2"},
+    {"value": "left", "label": "Left is closer", "hint": "", "key": "3"},
+    {"value": "right", "label": "Right is closer", "hint": "", "key": "4"},
+    {"value": "equal", "label": "Equally far", "hint": "", "key": "5"},
+    {"value": "cant_tell", "label": "Can't tell", "hint": "", "key": "0"},
+]
 SIDES = {
     "similarity": (("Yours", "{name}, recorded"), ("Other", "by what is learned so far at least as good")),
     "preference": (("Left", "as good as the other"), ("Right", "as good as the other")),
+    "closer": (("Left", "one way to do it"), ("Right", "another way")),
     "pair": (("Left", "{who} recorded this tool"), ("Right", "{who} recorded this tool")),
 }
 
@@ -140,6 +151,7 @@ def undo_answer(ctx: Context, answer_id: str, keep_later: bool = False) -> Json:
         session.flush()
         emit(session, "query.changed", query.project_id, query_id=query.id, run_id=run.id)
         run.error, run.policy_id = None, None
+        forget(session, run)
         go(session, run, "waiting_for_expert", "The answer was taken back; the question is open again.")
         return query_json(session, query)
 

@@ -8,6 +8,7 @@ from app.errors import InvalidInput
 from app.jobs.rows import add_job
 from app.learning.certified_state import CERTIFIED_WORDS, CertifiedParameters
 from app.learning.effort import EFFORT_WORDS, EffortParameters
+from app.learning.exception_run import EXCEPTION_WORDS, ExceptionParameters
 from app.learning.performance import PARAMETER_WORDS, PerformanceParameters
 from app.sequencing.features import FEATURE_SETS
 from app.storage import emit
@@ -22,17 +23,30 @@ from app.storage.tables import (
     RunCheckpoint,
     RunDemonstration,
     Segmentation,
+    ToolRow,
 )
 
 Json = dict[str, Any]
 
 TRAINING_JOB = "training"
-PARAMETERS: dict[str, type[PerformanceParameters] | type[CertifiedParameters] | type[EffortParameters]] = {
+Parameters = PerformanceParameters | CertifiedParameters | EffortParameters | ExceptionParameters
+PARAMETERS: dict[str, type[Parameters]] = {
     "certified": CertifiedParameters,
     "paper": PerformanceParameters,
     "effort": EffortParameters,
+    "exception": ExceptionParameters,
 }
-WORDS: dict[str, dict[str, tuple[str, str]]] = {"certified": CERTIFIED_WORDS, "paper": PARAMETER_WORDS, "effort": EFFORT_WORDS}
+WORDS: dict[str, dict[str, tuple[str, str]]] = {
+    "certified": CERTIFIED_WORDS,
+    "paper": PARAMETER_WORDS,
+    "effort": EFFORT_WORDS,
+    "exception": EXCEPTION_WORDS,
+}
+TITLES = {
+    "performance": "Learning from your orders",
+    "effort": "Learning what is effort",
+    "exception": "Looking for your order on one tool",
+}
 MODES = ("certified", "paper")  # of a performance run, the default first
 MOST: dict[str, int] = {"iterations": 5000, "samples": 1000, "classes": 50, "rounds": 200, "batch": 50, "most": 200, "cap": 5000}
 UP_TO_ONE = ("zeta", "tolerance")
@@ -40,10 +54,10 @@ UP_TO_ONE = ("zeta", "tolerance")
 
 def learner(row: Run) -> str:
     """Which learner a run has, as `PARAMETERS` names them."""
-    return "effort" if row.kind == "effort" else row.mode
+    return row.mode if row.kind == "performance" else row.kind
 
 
-def parameters_for(learns: str, params: Json) -> PerformanceParameters | CertifiedParameters | EffortParameters:
+def parameters_for(learns: str, params: Json) -> Parameters:
     """Hyperparameters from what a person gave; the rest has default values.
 
     Raises:
@@ -112,10 +126,44 @@ def run_json(session: Session, row: Run) -> Json:
         "error": row.error,
         "report": checkpoint.report if (checkpoint := checkpoint_of(session, row)) else None,
         "tools": list(session.exec(tools)),
+        "about": _about(session, row),
+        "to_show": _to_show(session, row),
         "version": row.version,
         "created_at": row.created_at,
         "updated_at": row.updated_at,
     }
+
+
+def _about(session: Session, row: Run) -> str | None:
+    """The tool a run about one tool asks about."""
+    return found_tool(session, row.interest[0]) if row.kind == "exception" else None
+
+
+def found_tool(session: Session, segmentation_id: str) -> str:
+    """The tool of a segmentation."""
+    cut = session.get(Segmentation, segmentation_id)
+    assert cut is not None
+    return cut.tool_id
+
+
+def demonstrations_of(session: Session, run_id: str) -> list[Demonstration]:
+    """What a run trains on, in its order."""
+    wanted = select(Demonstration).join(RunDemonstration, col(RunDemonstration.demonstration_id) == col(Demonstration.id))
+    return list(session.exec(wanted.where(RunDemonstration.run_id == run_id).order_by(col(RunDemonstration.position))))
+
+
+def wrong_both(session: Session, row: Run) -> list[str]:
+    """Tools on which both orders of a question were wrong, in the order asked."""
+    wanted = select(Query).where(Query.run_id == row.id, Query.kind == "pair", Query.state == "answered").order_by(col(Query.id))
+    told = [(q.tool_id, current_answer(session, q.id)) for q in session.exec(wanted).all()]
+    return list(dict.fromkeys(tool_id for tool_id, given in told if given is not None and given.value == "both_wrong"))
+
+
+def _to_show(session: Session, row: Run) -> list[Json]:
+    """Tools whose order a run waits to be shown."""
+    shown = set(session.exec(select(RunDemonstration.tool_id).where(RunDemonstration.run_id == row.id)))
+    tools = [session.get(ToolRow, key) for key in wrong_both(session, row) if key not in shown]
+    return [{"tool_id": tool.id, "tool_name": tool.name} for tool in tools if tool is not None and tool.deleted_at is None]
 
 
 def go(session: Session, row: Run, state: str, message: str | None = None) -> None:
@@ -138,7 +186,7 @@ def train_on(session: Session, row: Run, message: str, args: Json | None = None)
         TRAINING_JOB,
         row.project_id,
         row.id,
-        "Learning from your orders" if row.kind == "performance" else "Learning what is effort",
+        TITLES[row.kind],
         args or {},
     )
 

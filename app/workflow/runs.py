@@ -27,6 +27,7 @@ from app.workflow.queries import answer, get_query, list_queries, undo_answer
 from app.workflow.run_rows import (
     MODES,
     checkpoint_of,
+    demonstrations_of,
     go,
     open_queries,
     parameter_rows,
@@ -36,7 +37,6 @@ from app.workflow.run_rows import (
     withdraw,
     write_policy,
 )
-from app.workflow.training_job import demonstrations_of
 from app.workflow.training_step import LIKELIHOOD
 
 __all__ = [

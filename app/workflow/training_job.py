@@ -17,12 +17,23 @@ from app.learning.effort import EffortParameters
 from app.learning.performance import LearningDemonstration
 from app.learning.performance_conflict import contradiction_words
 from app.storage import emit
-from app.storage.tables import Demonstration, JobRow, Metric, PolicyRow, Query, Run, RunCheckpoint, RunDemonstration, Segmentation, ToolRow
+from app.storage.tables import Demonstration, JobRow, Metric, PolicyRow, Query, Run, RunCheckpoint, Segmentation, ToolRow
 from app.workflow.authors import shown_name
 from app.workflow.consistency import consistency, ill_fitting
+from app.workflow.exceptions import settle
 from app.workflow.feature_choice import stored_features
 from app.workflow.lookup import current_segmentation, found, same_regions
-from app.workflow.run_rows import TRAINING_JOB, checkpoint_of, current_answer, go, learner, parameters_for, write_policy
+from app.workflow.run_rows import (
+    TRAINING_JOB,
+    checkpoint_of,
+    current_answer,
+    demonstrations_of,
+    go,
+    learner,
+    parameters_for,
+    train_on,
+    write_policy,
+)
 from app.workflow.training_step import LIKELIHOOD, Asked, Outcome, Parameters, Step, compute
 from app.workflow.values import Values, interactions_from
 
@@ -91,6 +102,8 @@ def finish(values: Values, session: Session, job: JobRow, out: Outcome) -> None:
     row = session.get(Run, job.subject_id)
     if row is None or row.state not in ("queued", "training"):
         return
+    if _outdated(session, row, out):
+        return train_on(session, row, "Going on with the order you recorded meanwhile.")
     if out.outcome == "compromise":
         return _settle(session, row, out)
     for iteration, loss, terms, violations in out.metrics:
@@ -111,18 +124,18 @@ def finish(values: Values, session: Session, job: JobRow, out: Outcome) -> None:
         _close(session, row, out)
 
 
+def _outdated(session: Session, row: Run, out: Outcome) -> bool:
+    """Whether an order was recorded for a certified run while the step was under way."""
+    learned_from = (out.report or {}).get("slack")
+    return learned_from is not None and len(learned_from) != len(demonstrations_of(session, row.id))
+
+
 def fail(session: Session, job: JobRow, error: dict[str, str]) -> None:
     """The run stops; it can be resumed from its last checkpoint."""
     row = session.get(Run, job.subject_id)
     if row is not None and row.state in ("queued", "training"):
         row.error = error
         go(session, row, "failed", error["detail"])
-
-
-def demonstrations_of(session: Session, run_id: str) -> list[Demonstration]:
-    """What a run trains on, in its order."""
-    wanted = select(Demonstration).join(RunDemonstration, col(RunDemonstration.demonstration_id) == col(Demonstration.id))
-    return list(session.exec(wanted.where(RunDemonstration.run_id == run_id).order_by(col(RunDemonstration.position))))
 
 
 def _answers(session: Session, run_id: str) -> dict[str, str]:
@@ -170,8 +183,8 @@ def _new_query(values: Values, session: Session, row: Run, shown: list[Demonstra
     cut = found(session, Segmentation, key, "segmentation")
     tool = values.tool(session, cut)
     names, descriptions = [r.name for r in tool.regions], [r.description for r in tool.regions]
-    kind = "pair" if demonstration is None else "similarity" if row.kind == "performance" else "preference"
-    words = describe_difference(names, descriptions, asked.left, asked.right, *([PAIR] if kind == "pair" else []))
+    kind = _question_kind(row, demonstration)
+    words = describe_difference(names, descriptions, asked.left, asked.right, *([PAIR] if demonstration is None else []))
     return Query(
         run_id=row.id,
         project_id=row.project_id,
@@ -190,6 +203,12 @@ def _new_query(values: Values, session: Session, row: Run, shown: list[Demonstra
     )
 
 
+def _question_kind(row: Run, demonstration: Demonstration | None) -> str:
+    if demonstration is None:
+        return "closer" if row.kind == "exception" else "pair"
+    return "similarity" if row.kind == "performance" else "preference"
+
+
 def _named(session: Session, row: Run, report: Json) -> Json:
     """A certificate with the tools it speaks of: demonstrated ones beside their slack, the others with their chances."""
     shown = demonstrations_of(session, row.id)
@@ -199,8 +218,7 @@ def _named(session: Session, row: Run, report: Json) -> Json:
 
     ties = report["class_sizes"] or [None] * len(shown)
     demonstrated = [
-        {**name(d), "slack": slack, "ties": size}
-        for d, slack, size in zip(shown, report["slack"] or [0.0] * len(shown), ties, strict=True)
+        {**name(d), "slack": slack, "ties": size} for d, slack, size in zip(shown, report["slack"] or [0.0] * len(shown), ties, strict=True)
     ]
     tools = _named_tools(session, row, report["tools"])
     conflicts = [
@@ -233,7 +251,9 @@ def _named_tools(session: Session, row: Run, tools: list[Json]) -> list[Json]:
 
 def _close(session: Session, row: Run, out: Outcome) -> None:
     """The end of a run, with a policy if it converged."""
-    if out.outcome == "converged":
+    if out.outcome == "converged" and row.kind == "exception":
+        settle(session, row, out.state, len(_answers(session, row.id)))
+    elif out.outcome == "converged":
         write_policy(session, row, list(out.weights), list(out.identifiable), converged=True)
     elif out.outcome == "infeasible":
         shown, found_odd = demonstrations_of(session, row.id), out.contradiction.odd if out.contradiction else ()

@@ -9,6 +9,7 @@ from app.jobs.worker import Report
 from app.learning.certified_run import Memory, certified_step, start_certified
 from app.learning.certified_state import CertifiedParameters, CertifiedState
 from app.learning.effort import EffortParameters, EffortState, effort_step, start_effort
+from app.learning.exception_run import ExceptionMemory, ExceptionParameters, ExceptionState, exception_step
 from app.learning.generalising import Generalised, exceptions_predict_better, learn_generalising, on_features
 from app.learning.performance import (
     LearningDemonstration,
@@ -27,7 +28,7 @@ from app.sequencing.problem import TENSOR_LIMIT, SequencingProblem
 from app.workflow.values import Kept
 
 Json = dict[str, Any]
-Parameters = PerformanceParameters | CertifiedParameters | EffortParameters
+Parameters = PerformanceParameters | CertifiedParameters | EffortParameters | ExceptionParameters
 MetricRow = tuple[int, float, dict[str, float], int]
 
 LIKELIHOOD = "likelihood"  # kind of the step that settles a contradiction
@@ -39,6 +40,7 @@ AGREE = (
 CHUNK = 25  # iterations per job: a few seconds at most between two checkpoints
 _problems = Kept(48)  # of a worker process: their tables are costly to build
 _memories = Kept(4)  # of a worker process: what earlier steps of a certified run found; losing it costs only time
+_doubts = Kept(4)  # the same of runs about one tool
 
 
 @dataclass(frozen=True)
@@ -103,6 +105,8 @@ def compute(step: Step, report: Report) -> Outcome:
         return _certified(step, step.parameters, known, tools)
     if isinstance(step.parameters, EffortParameters):
         return _effort(step, step.parameters, known)
+    if isinstance(step.parameters, ExceptionParameters):
+        return _exception(step, step.parameters, known, tools[0], report)
     return _performance(step, step.parameters, known)
 
 
@@ -134,7 +138,7 @@ def _certified(
     step: Step, parameters: CertifiedParameters, demonstrations: list[LearningDemonstration], tools: list[SequencingProblem]
 ) -> Outcome:
     state = CertifiedState.from_json(step.state) if step.state else start_certified(demonstrations, tools, parameters, step.seed)
-    memory: Memory = _memories.get((step.run_id, step.seed, parameters), Memory.empty)
+    memory: Memory = _memories.get((step.run_id, step.seed, parameters, len(demonstrations)), Memory.empty)
     result = certified_step(demonstrations, tools, parameters, state, step.answers, memory, step.gone)
     return Outcome(
         state=result.state.to_json(),
@@ -203,6 +207,17 @@ def _effort(step: Step, parameters: EffortParameters, demonstrations: list[Learn
     asked = tuple(Asked(q.demonstration, q.left, q.right, q.why, q.differs, q.fingerprint) for q in result.questions)
     weights = _floats(result.effort_weights)
     return Outcome(result.state.to_json(), result.outcome, 0, (), asked, weights, tuple(True for _ in weights), result.message)
+
+
+def _exception(
+    step: Step, parameters: ExceptionParameters, demonstrations: list[LearningDemonstration], tool: SequencingProblem, report: Report
+) -> Outcome:
+    report(0.1, "Looking for orders you may want")
+    state = ExceptionState.from_json(step.state) if step.state else ExceptionState(step.seed)
+    memory: ExceptionMemory = _doubts.get((step.run_id, step.seed), ExceptionMemory)
+    result = exception_step(demonstrations, tool, parameters, state, step.answers, memory)
+    asked = tuple(Asked(None, q.left, q.right, q.why, q.differs, q.fingerprint, 0) for q in result.questions)
+    return Outcome(result.state.to_json(), "questions" if asked else "converged", 0, (), asked, (), (), result.message)
 
 
 def _row(m: Metric) -> MetricRow:

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from app.settings import Settings
-from app.workflow import projects
+from app.workflow import projects, runs, tools
 from app.workflow.context import Context, open_context
 
 
@@ -41,3 +41,20 @@ def project_of(ctx: Context) -> dict[str, Any]:
     """The only project."""
     (project,) = projects.list_projects(ctx)
     return project
+
+
+def settle(ctx: Context, run: dict[str, Any]) -> dict[str, Any]:
+    """The run once nothing is being computed."""
+    assert ctx.jobs.wait_idle(180)
+    return runs.get_run(ctx, run["id"])
+
+
+def open_questions(ctx: Context, run: dict[str, Any]) -> list[dict[str, Any]]:
+    """What waits for the expert."""
+    return runs.list_queries(ctx, run_id=run["id"], state="open")
+
+
+def tool_without_order(ctx: Context) -> dict[str, Any]:
+    """The smallest tool nobody has recorded."""
+    rows = [tool for tool in tools.list_tools(ctx, project_of(ctx)["id"]) if not tool["demonstrated"]]
+    return min(rows, key=lambda tool: tool["region_count"])

@@ -10,7 +10,7 @@ from app.settings import Settings
 from app.storage.tables import JobRow, RunCheckpoint
 from app.workflow import demonstrations, policies, runs, tools
 from app.workflow.context import Context, open_context
-from tests.workflow.conftest import project_of
+from tests.workflow.conftest import open_questions, project_of, settle
 
 Json = dict[str, Any]
 SEED = 1
@@ -21,15 +21,6 @@ def opinion(query: Json) -> str:
     """A fixed opinion that mixes answers."""
     left, right = query["left"]["sequence"], query["right"]["sequence"]
     return ("left", "right", "both_wrong")[(left[0] + 2 * right[-1]) % 3]
-
-
-def settle(ctx: Context, run: Json) -> Json:
-    assert ctx.jobs.wait_idle(60)
-    return runs.get_run(ctx, run["id"])
-
-
-def open_questions(ctx: Context, run: Json) -> list[Json]:
-    return runs.list_queries(ctx, run_id=run["id"], state="open")
 
 
 def waiting(ctx: Context) -> Json:
@@ -94,6 +85,10 @@ def test_a_finished_run_leaves_a_certificate(sample: Context) -> None:
     assert proof == run["report"]
     assert proof["realisable"] is True
     assert proof["margin"] > 0
+    assert [(i["first"], i["tested"]) for i in proof["interactions"]] == [("height", True), ("orientation", True)]
+    assert policy["interactions"] == [{k: i[k] for k in ("first", "second")} for i in proof["interactions"] if i["kept"]]
+    assert all(w["interval"][0] - 1e-9 <= w["share"] <= w["interval"][1] + 1e-9 for w in policy["weights"] if w["share"] > 0.05)
+    assert all(sorted(d["sequence"]) == list(range(len(d["sequence"]))) for d in proof["demonstrations"])
     assert {d["tool_id"] for d in proof["demonstrations"]} == set(run["tools"])
     assert all(d["slack"] == 0 and d["ties"] >= 1 for d in proof["demonstrations"])
     assert {t["tool_name"] for t in proof["tools"]} == {
@@ -216,3 +211,25 @@ def test_an_unknown_mode_is_refused(sample: Context) -> None:
         runs.start_run(sample, project_of(sample)["id"], "performance", mode="fast")
     with pytest.raises(InvalidInput, match="no parameter 'alpha'"):
         runs.start_run(sample, project_of(sample)["id"], "performance", {"alpha": 1})
+
+
+def test_an_order_recorded_because_both_were_wrong_is_learned_from(sample: Context) -> None:
+    """The run goes on with it where it was: earlier answers stay, and the new order is one of those it explains."""
+    run = waiting(sample)
+    first, other = open_questions(sample, run)
+    runs.answer(sample, first["id"], "both_wrong")
+    assert [entry["tool_id"] for entry in runs.get_run(sample, run["id"])["to_show"]] == [first["tool_id"]]
+    wanted = first["left"]["sequence"][::-1]
+    demonstrations.create_demonstration(sample, first["tool_id"], wanted)
+    run = settle(sample, run)
+    assert (run["to_show"], run["tools"][-1]) == ([], first["tool_id"])
+    if run["state"] == "waiting_for_expert":
+        assert [q["id"] for q in open_questions(sample, run)] == [other["id"]]
+    assert run["answered"] == 1
+    shown = run["report"]["demonstrations"]
+    assert len(shown) == len(run["tools"]) == 6
+    assert shown[-1]["tool_id"] == first["tool_id"]
+
+    unasked = next(t for t in tools.list_tools(sample, project_of(sample)["id"]) if t["id"] not in run["tools"])
+    demonstrations.create_demonstration(sample, unasked["id"], list(range(unasked["region_count"])))
+    assert runs.get_run(sample, run["id"])["tools"] == run["tools"]

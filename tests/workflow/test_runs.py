@@ -15,7 +15,7 @@ from app.settings import Settings
 from app.storage.tables import Answer, JobRow, Query, RunCheckpoint
 from app.workflow import demonstrations, policies, projects, runs, tools
 from app.workflow.context import Context, open_context
-from tests.workflow.conftest import project_of
+from tests.workflow.conftest import open_questions, project_of, settle
 
 Json = dict[str, Any]
 Opinion = Callable[[Json], str]
@@ -27,15 +27,6 @@ def opinion(query: Json) -> str:
     if query["kind"] == "preference":
         return "left" if query["left"]["sequence"][0] <= query["right"]["sequence"][0] else "right"
     return "similar" if query["left"]["sequence"][-1] == query["right"]["sequence"][-1] else "not_similar"
-
-
-def settle(ctx: Context, run: Json) -> Json:
-    assert ctx.jobs.wait_idle(60)
-    return runs.get_run(ctx, run["id"])
-
-
-def open_questions(ctx: Context, run: Json) -> list[Json]:
-    return runs.list_queries(ctx, run_id=run["id"], state="open")
 
 
 def waiting(ctx: Context, kind: str = "performance") -> Json:

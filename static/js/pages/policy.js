@@ -13,6 +13,7 @@ import { View3D } from "../view3d.js";
 import { Wishes } from "../wishes.js";
 import { number, plural } from "../words.js";
 import { Certificate } from "./policy-certificate.js";
+import { Doubt, wantedWords } from "./policy-doubt.js";
 
 const CAUSES = 5; // named in the chart; the rest is one grey bar
 
@@ -30,6 +31,7 @@ const parts = {
 const wishes = new Wishes({ onChange: plan });
 const names = new Map();
 const certificate = new Certificate({ projectId: shell.projectId, names, onCompare: (tool, sequence) => compare(tool, sequence).catch(complain) });
+const doubt = new Doubt({ projectId: shell.projectId, onDropped: () => plan(null) });
 const state = { policies: [], policy: null, tools: [], tool: null, plan: null, order: [], recorded: false, whatif: null, view: null, stepper: null, chart: null };
 
 // ---- chart --------------------------------------------------------------------------------------------------------------------
@@ -161,8 +163,9 @@ function paintProof() {
   const { plan } = state;
   parts.proof.dataset.proved = String(plan.proved);
   fill(parts.proof, icon(plan.proved ? "shield" : "warn"), h("div", {}, h("b", {}, plan.sureness),
-    h("span.small.muted", { dataset: plan.proved ? {} : { tip: plan.method } }, plan.proved ? `Cheapest of all ${plan.constraints ? "orders that keep what you asked" : `${plan.orders} orders`}, in ${number(plan.milliseconds, 2)} ms` : `${plural(plan.sequence.length, "region")} are too many to look at every order${plan.bound === null ? "" : `; none costs less than ${number(plan.bound)}`}.`)));
+    h("span.small.muted", { dataset: plan.proved ? {} : { tip: plan.method } }, plan.exception ? wantedWords(plan.exception) : plan.proved ? `Cheapest of all ${plan.constraints ? "orders that keep what you asked" : `${plan.orders} orders`}, in ${number(plan.milliseconds, 2)} ms` : `${plural(plan.sequence.length, "region")} are too many to look at every order${plan.bound === null ? "" : `; none costs less than ${number(plan.bound)}`}.`)));
   certificate.show(state.policy, state.tool);
+  doubt.show(state.policy, state.tool, plan);
   const fact = (term, value, tip = null) => h("div.fact", { dataset: tip ? { tip } : {} }, h("dt", {}, term), h("dd", {}, value));
   fill(parts.facts, fact("Cost", number(plan.cost), "C = w · Φ, added along the order; low is good"),
     fact("Equally cheap", plan.ties === 1 ? "this one only" : `${Number(plan.ties).toLocaleString("en")} orders`, "Orders in the lowest cost class (relative 1e-7)"),
@@ -236,7 +239,7 @@ async function start() {
   state.stepper = new Stepper({ n: 1, onStep: showOrder, name: "Play the order" });
   parts.stage.append(h("div.bl", {}, h("div.play", {}, state.stepper.node)));
   state.stepper.node.style.flex = "1";
-  fill(shell.main, parts.head, h("div.policy-upper", {}, parts.stage, h("aside.card.fill", {}, parts.proof, certificate.line, parts.facts, wishes.node, parts.whatif)),
+  fill(shell.main, parts.head, h("div.policy-upper", {}, parts.stage, h("aside.card.fill", {}, parts.proof, doubt.node, certificate.line, parts.facts, wishes.node, parts.whatif)),
     h("section.card.policy-lower", { "aria-label": "Why this order" }, h("div.bar-head", {}, h("h2.nowrap", {}, "Why this order"), h("span.small.muted.nowrap", {}, "cost per step"), parts.legend), parts.chart, parts.tiles, h("p.underline", {}, "Drag a region to another place, or use Alt with the arrows.")), certificate.node);
   state.view = new View3D(parts.stage, { projectId: shell.projectId, name: "policy" });
   state.view.onPicked((region) => wishes.pick(region));

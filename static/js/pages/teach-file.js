@@ -11,12 +11,11 @@ export class QuestionFile {
   constructor({ onRead }) {
     this.onRead = onRead;
     this.runId = "";
-    this.report = h("div", { role: "status" });
+    this.report = h("div", { role: "status" }); // stays until it is dismissed, whatever the run does meanwhile
     this.input = h("input", { type: "file", accept: ".csv,text/csv", hidden: true, "aria-label": "File with answers", onchange: () => this.read() });
   }
 
   menu(runId) {
-    if (runId !== this.runId) fill(this.report);
     this.runId = runId;
     const address = `/api/v1/runs/${encodeURIComponent(runId)}`;
     const entries = () => [
@@ -37,7 +36,8 @@ export class QuestionFile {
       toast(count ? `${plural(count, "answer")} read from ${file.name}` : `No new answer in ${file.name}`);
       const lines = [...report.faults, ...report.already].sort((a, b) => a.line - b.line);
       const words = `${plural(lines.length, "row")} of ${file.name} ${lines.length === 1 ? "does" : "do"} not count. The other answers are stored.`;
-      fill(this.report, lines.length ? h("div.note.warn", {}, icon("warn"), h("div", {}, h("p", {}, words), h("ul", {}, lines.map((row) => h("li", {}, row.text))))) : null);
+      const dismiss = h("button.btn.quiet.small", { type: "button", dataset: { key: "dismiss-report" }, onclick: () => fill(this.report) }, "Dismiss");
+      fill(this.report, lines.length ? h("div.note.warn", {}, icon("warn"), h("div", {}, h("p", {}, words), h("ul", {}, lines.map((row) => h("li", {}, row.text))), dismiss)) : null);
       await this.onRead(report);
     } catch (error) {
       complain(error);

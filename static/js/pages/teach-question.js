@@ -29,7 +29,7 @@ export class QuestionView {
     this.answers = h("div.answers", { role: "group", "aria-labelledby": "question-title" });
     this.below = h("div.below");
     this.stepper = new Stepper({ n: 1, name: "Play both", onStep: () => this.paint(), when: () => this.active });
-    this.nodes = [this.top, this.switch, this.pair, this.stepper.node, this.answers, this.below, this.file.report];
+    this.nodes = [this.top, this.switch, this.pair, this.stepper.node, this.answers, this.below];
     this.wide.addEventListener("change", () => this.arrange());
     addEventListener("themechange", () => this.query && this.paint());
     this.bindKeys();
@@ -40,7 +40,7 @@ export class QuestionView {
   }
 
   bindKeys() {
-    bind({ key: (key) => this.active && this.query.choices.some((choice) => choice.key === key), shown: "1 2 3 4 0", name: "Answer the question", when: () => this.active, run: (event) => this.answer(this.query.choices.find((choice) => choice.key === event.key)) });
+    bind({ key: (key) => this.active && this.query.choices.some((choice) => choice.key === key), shown: "1 2 3 4 5 0", name: "Answer the question", when: () => this.active, run: (event) => this.answer(this.query.choices.find((choice) => choice.key === event.key)) });
     bind({ key: "u", name: "Undo the last answer", when: () => this.canUndo(), run: () => this.onUndo() });
     bind({ key: "z", ctrl: true, shift: false, name: "Undo the last answer", when: () => this.canUndo(), run: () => this.onUndo() });
     bind({ key: "v", name: "Show the other order (narrow window)", when: () => this.active && !this.wide.matches, run: () => this.choose(this.chosen === "left" ? "right" : "left") });

@@ -86,6 +86,7 @@ export async function startCards({ project, runs, onStarted }) {
 }
 
 function learnedWords(run) {
+  if (run.kind === "exception") return "The questions about this tool are over";
   if (run.kind !== "performance") return "Learned: which order is less effort";
   return run.violations ? "Learned, but not every recorded order is the best one" : "Learned: every demonstration is explained";
 }
@@ -107,7 +108,7 @@ function recordAgain(run, project, tools) {
 
 function outcomeActions(run, project, act, tools) {
   const button = (words, action, primary = false) => h(`button.btn${primary ? ".primary" : ""}`, { type: "button", onclick: () => act(action).catch(complain) }, words);
-  if (run.state === "converged") return [h("a.btn.primary", { href: pageAddress(project.id, "policy") }, "See the policy")];
+  if (run.state === "converged") return [h("a.btn.primary", { href: pageAddress(project.id, "policy", run.about ? { tool: run.about } : {}) }, run.about ? "See the order" : "See the policy")];
   if (run.state === "stalled") return [button("Take what was learned", "finish", true), h("a.btn", { href: pageAddress(project.id, "coverage") }, "What to record next")];
   if (run.state === "failed" || run.state === "cancelled") return [button("Go on", "resume", true)];
   if (run.state === "infeasible") return [...recordAgain(run, project, tools), button("Use the best compromise", "finish")];
@@ -133,6 +134,6 @@ export function outcomeCard({ run, project, act, tools = [] }) {
   const outcome = OUTCOMES[run.state]?.(run);
   if (!outcome) return null;
   const details = [run.message, typeof run.error === "string" ? run.error : run.error?.detail].filter(Boolean);
-  return h("section.card.outcome", { "aria-label": "How it ended" }, h(`span.chip${outcome.tone ? `.${outcome.tone}` : ""}`, {}, icon(outcome.mark), `${run.kind === "performance" ? "Learning" : "Preferences"}, ${ago(run.updated_at)}`),
+  return h("section.card.outcome", { "aria-label": "How it ended" }, h(`span.chip${outcome.tone ? `.${outcome.tone}` : ""}`, {}, icon(outcome.mark), `${{ performance: "Learning", effort: "Preferences", exception: "One tool" }[run.kind]}, ${ago(run.updated_at)}`),
     h("h2", {}, outcome.title), h("p", {}, outcome.text), [...new Set(details)].map((text) => h("p", {}, text)), chances(run.report, project), h("div.actions", {}, outcomeActions(run, project, act, tools)));
 }

@@ -19,6 +19,10 @@ const OPEN_TERMS = [
 ];
 const termsOf = (run) => (run?.mode === "certified" ? OPEN_TERMS : TERMS);
 
+const NOTES = {
+  effort: "The effort run has no steps of its own: after each round of answers it solves for the start and end you like best.",
+  exception: "After each answer, orders it speaks against become improbable; after three at most the likeliest one counts for this tool.",
+};
 const KEY_FACTS = 4;
 
 export const explained = (violations) => (violations === 0 ? "every demonstration explained" : `${plural(violations, "demonstration")} not yet explained`);
@@ -58,7 +62,7 @@ export class Training {
     this.stop.hidden = !["queued", "training", "waiting_for_expert"].includes(run.state);
     this.plots.classList.toggle("tall", tall);
     this.plots.hidden = run.kind !== "performance";
-    this.note.textContent = run.kind === "performance" ? "" : "The effort run has no steps of its own: after each round of answers it solves for the start and end you like best.";
+    this.note.textContent = run.kind === "performance" ? "" : NOTES[run.kind];
     this.note.hidden = run.kind === "performance";
     if (tall) this.node.open = true;
     this.drawParameters(run);

@@ -7,18 +7,21 @@ import { gathered, listen } from "../events.js";
 import { boot, pageAddress, showFault } from "../shell.js";
 import { complain, toast } from "../toasts.js";
 import { ago, number, plural } from "../words.js";
+import { Notes } from "./teach-notes.js";
 import { QuestionView } from "./teach-question.js";
 import { outcomeCard, startCards } from "./teach-start.js";
 import { Training } from "./teach-training.js";
 
 const ACTIVE = ["waiting_for_expert", "training", "queued", "cancelling"];
-const KIND_WORDS = { performance: "what makes an order good", effort: "which good order is less effort" };
+const KIND_WORDS = { performance: "what makes an order good", effort: "which good order is less effort", exception: "the order you want on one tool" };
+const HISTORY_WORDS = { performance: "What makes an order good", effort: "Which one is less effort", exception: "An order for one tool" };
 const STATE_WORDS = { queued: "about to start", training: "learning", waiting_for_expert: "waiting for you", converged: "learned", stalled: "nothing left to ask", infeasible: "contradictions", failed: "stopped with an error", cancelling: "stopping", cancelled: "stopped" };
 
 const shell = await boot();
 const state = { runs: [], run: null, queries: [], answers: [], regions: new Map(), mode: "" };
 const training = new Training({ onCancel: () => runAction("cancel").catch(complain) });
 const question = new QuestionView({ projectId: shell.projectId, regionsOf: (tool) => state.regions.get(tool) ?? [], onAnswer: answer, onUndo: () => undo().catch(complain), canUndo: () => state.answers.length > 0, onFile: fileRead });
+const notes = new Notes({ projectId: shell.projectId, report: question.file.report });
 
 // ---- actions -----------------------------------------------------------------------------------------------------------------
 
@@ -31,7 +34,7 @@ async function answer(query, choice) {
   try {
     const given = await post(`/queries/${encodeURIComponent(query.id)}/answer`, { value: choice.value });
     state.answers.push(given);
-    toast(choice.value === "both_wrong" ? `Then show us: ${query.tool_name} waits on the record page` : `Answered: ${choice.label}`, { undo: () => undo(given) });
+    toast(choice.value === "both_wrong" ? `Then show us your order for ${query.tool_name}` : `Answered: ${choice.label}`, { undo: () => undo(given) });
   } catch (error) {
     complain(error);
   }
@@ -113,11 +116,12 @@ async function draw() {
   if (mode !== "question") question.hide();
   if (mode === "start") return drawStart();
   training.show(run, { tall: mode === "training" });
+  notes.show(run);
   if (mode === "question") {
     question.show(queries[0]);
-    if (state.mode !== mode || !question.pair.isConnected) fill(shell.main, question.nodes, training.node);
+    if (state.mode !== mode || !question.pair.isConnected) fill(shell.main, notes.node, question.nodes, training.node);
   } else if (mode === "training") {
-    if (state.mode !== mode) fill(shell.main, trainingHead, training.node, h("p.small.muted", {}, "You can close this page: learning goes on, and questions wait for you."));
+    if (state.mode !== mode) fill(shell.main, trainingHead, notes.node, training.node, h("p.small.muted", {}, "You can close this page: learning goes on, and questions wait for you."));
     drawTrainingHead();
   } else await drawEnded();
   if (state.mode === "training" && mode === "question") training.node.open = false;
@@ -152,12 +156,12 @@ async function drawEnded() {
   if (run.state === "converged" && run.kind === "performance") cards.querySelectorAll(".btn.primary").forEach((button) => button.classList.remove("primary"));
   else if (["stalled", "failed", "cancelled", "converged", "infeasible"].includes(run.state)) cards.querySelectorAll(".btn.primary").forEach((button) => button.classList.remove("primary"));
   training.node.open = false;
-  fill(shell.main, head(`The last run used ${plural(run.tools.length, "demonstration")}.`), outcomeCard({ run, project: shell.project, act: runAction, tools }), cards, training.node, history());
+  fill(shell.main, head(`The last run used ${plural(run.tools.length, "demonstration")}.`), notes.node, outcomeCard({ run, project: shell.project, act: runAction, tools }), cards, training.node, history());
 }
 
 function history() {
   if (state.runs.length < 2) return null;
-  const row = (run) => h("tr", {}, h("td", {}, run.kind === "performance" ? "What makes an order good" : "Which one is less effort"), h("td", {}, STATE_WORDS[run.state] ?? run.state), h("td.num", {}, plural(run.answered, "answer")), h("td.num.muted", {}, ago(run.created_at)),
+  const row = (run) => h("tr", {}, h("td", {}, HISTORY_WORDS[run.kind]), h("td", {}, STATE_WORDS[run.state] ?? run.state), h("td.num", {}, plural(run.answered, "answer")), h("td.num.muted", {}, ago(run.created_at)),
     h("td", {}, run.policy_id ? h("a", { href: pageAddress(shell.projectId, "policy", { policy: run.policy_id }) }, "policy") : ""));
   return h("section.card", { style: { flex: "none" } }, h("div.card-head", {}, h("h2", {}, "All runs")), h("table.run-list", {}, h("thead", {}, h("tr", {}, h("th", {}, "Learned"), h("th", {}, "State"), h("th.num", {}, "Answers"), h("th.num", {}, "Started"), h("th", {}, ""))), h("tbody", {}, state.runs.map(row))));
 }
