@@ -11,6 +11,7 @@ from collections.abc import Sequence as Ordered
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.learning.certified import Explored
 from app.learning.cuts import CutPool, unit_rows
@@ -123,7 +124,7 @@ def _sharpness(samples: Array, compared: list[Comparison], rate: float | None) -
     return float(np.log(p / (1 - p))) / max(typical, 1e-3)
 
 
-def _resampled(logs: Array, count: int, generator: np.random.Generator) -> Array:
+def _resampled(logs: Array, count: int, generator: np.random.Generator) -> NDArray[np.intp]:
     """Indices drawn with probability exp(logs), evenly spread (systematic resampling)."""
     share = np.cumsum(np.exp(logs - logs.max()))
     return np.searchsorted(share / share[-1], (np.arange(count) + generator.random()) / count)

@@ -40,7 +40,8 @@ def picture(tool: Tool, sequence: Ordered[int], differs: Ordered[int], title: st
     middles = placed[len(tool.mesh.vertices) :]
     plates = "".join(_plate(middles[a], place[a] + 1, thick=a in differs) for a in reversed(sequence))
     return (
-        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{escape(title, quote=True)}">'
+        f'<svg xmlns="http://www.w3.org/2000/svg" font-family="system-ui, sans-serif" '
+        f'viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{escape(title, quote=True)}">'
         f'<g stroke-width="0.5" stroke-linejoin="round">{surface}</g>{plates}</svg>'
     )
 

@@ -22,6 +22,7 @@ from app.storage.tables import RegionName, Segmentation
 
 KEPT_TOOLS, KEPT_PROBLEMS, KEPT_REPORTS = 64, 24, 32
 KEPT_TREES, KEPT_MAPS = 8, 256
+KEPT_COMPARISONS = 8
 
 
 class Kept:
@@ -60,6 +61,7 @@ class Values:
         self._tools = Kept(KEPT_TOOLS)
         self._problems = Kept(KEPT_PROBLEMS)
         self.reports = Kept(KEPT_REPORTS)
+        self.comparisons = Kept(KEPT_COMPARISONS)  # of experts
         self._trees = Kept(KEPT_TREES)
         self._parts = Kept(KEPT_TREES)
         self._patches = Kept(KEPT_TREES)

@@ -16,7 +16,7 @@ BEN = ScriptedExpert(OTHER, None)
 def test_like_minded_experts_can_be_pooled():
     found = compare_experts({"Anna": demonstrations(ANNA, TOOLS[:4]), "Carl": demonstrations(ANNA, TOOLS[4:8])}, TOOLS[8:])
     assert found.pooled.realisable
-    assert found.conflicts == ()
+    assert found.clash == ()
     assert np.allclose(np.diag(found.likeness), 1.0)
 
 
@@ -25,9 +25,7 @@ def test_different_experts_are_kept_apart_and_their_differences_shown():
     found = compare_experts({"Anna": demonstrations(ANNA, TOOLS[:8]), "Ben": demonstrations(BEN, TOOLS[:8])}, TOOLS)
     assert all(c.realisable for c in found.certificates)
     assert not found.pooled.realisable
-    assert found.conflicts
-    for conflict in found.conflicts:  # no minimal set lies within one expert
-        assert {i < 8 for i in conflict.members} == {True, False}
+    assert {i < 8 for i in found.clash} == {True, False}  # no smallest set lies within one expert
     assert found.disagreements
     assert [d.extra for d in found.disagreements] == sorted((d.extra for d in found.disagreements), reverse=True)
     d = found.disagreements[0]

@@ -5,9 +5,9 @@ from typing import Any
 import pytest
 
 from app.errors import InvalidInput
-from app.workflow import coverage, demonstrations, queries, record, runs, tools
+from app.workflow import coverage, demonstrations, experts, queries, record, runs, tools
 from app.workflow.context import Context
-from tests.workflow.conftest import project_of
+from tests.workflow.conftest import project_of, settle
 
 Json = dict[str, Any]
 
@@ -78,12 +78,12 @@ def test_a_run_learns_from_the_experts_it_names(sample: Context, tool: Json) -> 
     demonstrations.create_demonstration(sample, tool["id"], list(range(n)), author="Anna")
     with pytest.raises(InvalidInput, match=r"no order by Ben.*Scripted expert, Anna"):
         runs.start_run(sample, project, "performance", authors=["Ben"])
-    run = settled(sample, runs.start_run(sample, project, "performance", authors=["scripted expert"]))
+    run = settle(sample, runs.start_run(sample, project, "performance", authors=["scripted expert"]))
     assert run["authors"] == ["Scripted expert"]
     assert tool["id"] not in run["tools"]
     assert run["state"] in ("waiting_for_expert", "converged"), run["message"]
     runs.cancel(sample, run["id"])
-    pooled = settled(sample, runs.start_run(sample, project, "performance"))
+    pooled = settle(sample, runs.start_run(sample, project, "performance"))
     assert pooled["authors"] == ["Scripted expert", "Anna"]
     assert len(pooled["tools"]) == 6
     assert pooled["state"] == "infeasible"
@@ -94,24 +94,19 @@ def test_a_run_learns_from_the_experts_it_names(sample: Context, tool: Json) -> 
 def test_with_one_expert_a_run_names_nobody(sample: Context, tool: Json) -> None:
     run = runs.start_run(sample, tool["project_id"], "performance")
     assert run["authors"] == []
-    assert settled(sample, run)["report"]["demonstrations"][0]["tool_name"] in {
+    assert settle(sample, run)["report"]["demonstrations"][0]["tool_name"] in {
         t["name"] for t in tools.list_tools(sample, tool["project_id"])
     }
-
-
-def settled(ctx: Context, run: Json) -> Json:
-    assert ctx.jobs.wait_idle(60)
-    return runs.get_run(ctx, run["id"])
 
 
 def test_contradicting_answers_are_weighed_named_and_taken_back_alone(sample: Context) -> None:
     """Sides alternate, so an expert who always says "left" contradicts the check; the run ends all the same and says which."""
     params = {"tolerance": 0.0001, "check": 1, "most": 4}
-    run = settled(sample, runs.start_run(sample, project_of(sample)["id"], "performance", params))
+    run = settle(sample, runs.start_run(sample, project_of(sample)["id"], "performance", params))
     while run["state"] == "waiting_for_expert":
         for query in runs.list_queries(sample, run_id=run["id"], state="open"):
             runs.answer(sample, query["id"], "left")
-        run = settled(sample, run)
+        run = settle(sample, run)
     assert run["state"] == "converged", run["message"]
     report = run["report"]
     assert report["weighed"] is True
@@ -125,7 +120,7 @@ def test_contradicting_answers_are_weighed_named_and_taken_back_alone(sample: Co
     after = {q["id"]: q["answer"] for q in runs.list_queries(sample, run_id=run["id"]) if q["answer"]}
     assert after == {k: v for k, v in before.items() if k != worst["query_id"]}
     runs.answer(sample, query["id"], "cant_tell")
-    again = settled(sample, run)
+    again = settle(sample, run)
     assert worst["query_id"] not in {entry["query_id"] for entry in again["report"]["unclear"]}
 
 
@@ -138,7 +133,7 @@ def test_an_order_recorded_again_measures_consistency(sample: Context, tool: Jso
     demonstrations.create_demonstration(sample, tool["id"], order[::-1], author="Ben")
 
     def again() -> Json:
-        run = settled(sample, runs.start_run(sample, tool["project_id"], "performance", authors=["Anna"]))
+        run = settle(sample, runs.start_run(sample, tool["project_id"], "performance", authors=["Anna"]))
         if run["state"] == "waiting_for_expert":
             runs.cancel(sample, run["id"])
         return run["report"]["consistency"]
@@ -150,3 +145,33 @@ def test_an_order_recorded_again_measures_consistency(sample: Context, tool: Jso
     now = demonstrations.get_demonstration(sample, first["id"])
     demonstrations.delete_demonstration(sample, first["id"], now["version"])
     assert again()["orders_again"] == 0
+
+
+def test_like_minded_experts_can_be_pooled_others_are_told_apart(sample: Context, tool: Json) -> None:
+    """Anna repeats two of the sample's orders; then Ben works one of them backwards."""
+    project = tool["project_id"]
+    assert [e["name"] for e in experts.experts(sample, project)["experts"]] == ["Scripted expert"]
+    shown = [d for d in demonstrations.list_demonstrations(sample, project_id=project) if d["author"] == "Scripted expert"][:2]
+    for d in shown:
+        demonstrations.create_demonstration(sample, d["tool_id"], d["sequence"], author="Anna")
+    found = experts.experts(sample, project)
+    assert [(e["name"], e["own"], len(e["tools"]), e["explained"]) for e in found["experts"]] == [
+        ("Scripted expert", True, 5, True),
+        ("Anna", False, 2, True),
+    ]
+    assert found["pooling"]["safe"] is True
+    assert [(r["agreement"], r["just_as_good"], r["differs"]) for r in found["tools"]] == [(1.0, True, [])] * 2
+    assert found["pairs"][0]["text"].startswith("Scripted expert and Anna have both recorded 2 tools: 2 in the same order")
+
+    backwards = shown[0]["sequence"][::-1]
+    demonstrations.create_demonstration(sample, shown[0]["tool_id"], backwards, author="Ben")
+    found = experts.experts(sample, project)
+    assert found["pooling"]["safe"] is False
+    assert "Ben" in {c["author"] for c in found["pooling"]["clash"]}
+    row = next(r for r in found["tools"] if r["recorded"] and r["second"]["author"] == "Ben")
+    assert (row["agreement"], row["just_as_good"]) == (-1.0, False)
+    assert row["extra"] > 0
+    assert "backwards" in row["text"]
+    svg = experts.tool_picture(sample, row["tool_id"], row["first"]["sequence"], row["second"]["sequence"])
+    assert svg.count("<circle") == len(backwards)
+    assert svg.count('stroke-width="2.2"') == len(row["differs"])

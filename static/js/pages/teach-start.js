@@ -7,6 +7,7 @@ import { icon } from "../icons.js";
 import { pageAddress } from "../shell.js";
 import { complain } from "../toasts.js";
 import { ago, number, plural } from "../words.js";
+import { readExperts } from "./teach-experts.js";
 
 function parameterField(entry) {
   if (typeof entry.value === "boolean") return h("label.check", {}, h("input", { type: "checkbox", name: entry.key, checked: entry.value }), h("span.symbol", { dataset: { tip: `${entry.symbol} in the effort's features, usually ${entry.default ? "on" : "off"}` } }, entry.label));
@@ -51,15 +52,20 @@ async function parameterDrawer(projectId, kind, mode = "certified") {
   return { node, values, seed: () => (seed.querySelector("input").value === "" ? null : Number(seed.querySelector("input").value)) };
 }
 
-function startButton(projectId, kind, drawer, primary, words, reason, onStarted) {
+function startButton(projectId, kind, drawer, primary, words, reason, onStarted, experts = null) {
   const fault = h("p.error-text", { role: "alert" });
   const button = h(`button.btn${primary && !reason ? ".primary" : ""}`, { type: "button", dataset: { tip: reason ?? "" }, "aria-disabled": reason ? "true" : null, onclick: async () => {
     if (reason || button.disabled) return;
+    const authors = experts ? experts.chosen() : [];
+    if (experts && !authors.length) {
+      fault.textContent = "Choose at least one expert whose orders it learns from.";
+      return;
+    }
     button.disabled = true;
     fault.textContent = "";
     try {
       const seed = drawer.seed();
-      onStarted(await post(`/projects/${encodeURIComponent(projectId)}/runs`, { kind, ...(drawer.mode ? { mode: drawer.mode() } : {}), params: drawer.values(), ...(seed === null ? {} : { seed }) }));
+      onStarted(await post(`/projects/${encodeURIComponent(projectId)}/runs`, { kind, ...(drawer.mode ? { mode: drawer.mode() } : {}), params: drawer.values(), authors, ...(seed === null ? {} : { seed }) }));
     } catch (error) {
       fault.textContent = error.message;
     }
@@ -71,18 +77,18 @@ function startButton(projectId, kind, drawer, primary, words, reason, onStarted)
 // The two cards. `learned`: a performance policy exists.
 export async function startCards({ project, runs, onStarted }) {
   const learned = runs.some((run) => run.kind === "performance" && run.state === "converged");
-  const [performance, effort] = await Promise.all([modeDrawer(project.id), parameterDrawer(project.id, "effort")]);
+  const [performance, effort, experts] = await Promise.all([modeDrawer(project.id), parameterDrawer(project.id, "effort"), readExperts(project.id)]);
   const count = project.counts.demonstrations;
   const empty = count === 0 ? "Record at least one demonstration first" : null;
   const before = learned ? null : "Learn what makes an order good first: this decides between orders that are equally good";
   return h("div.kinds", {},
     h("section.card.kind", {}, h("h2", {}, "What makes an order good"),
       h("p", {}, count ? `Learns from ${plural(count, "demonstration")} what an order should cost, and asks you about tools that can still go more than one way.` : "Learns from your demonstrations. There is none yet."),
-      startButton(project.id, "performance", performance, !learned, learned ? "Learn again" : "Start learning", empty, onStarted),
+      experts?.choice, startButton(project.id, "performance", performance, !learned, learned ? "Learn again" : "Start learning", empty, onStarted, experts),
       count ? performance.node : h("a.btn", { href: pageAddress(project.id, "record") }, "Record a demonstration")),
     h("section.card.kind", {}, h("h2", {}, "Which good order is less effort"),
       h("p", {}, "Some orders are equally good, but one starts or ends where it suits you better. Asks you which of two is less effort."),
-      startButton(project.id, "effort", effort, learned, "Start asking", empty ?? before, onStarted), learned ? effort.node : null));
+      startButton(project.id, "effort", effort, learned, "Start asking", empty ?? before, onStarted), learned ? effort.node : null), experts?.node);
 }
 
 function learnedWords(run) {
@@ -130,10 +136,20 @@ function chances(report, project) {
       h("table.run-list", {}, h("thead", {}, h("tr", {}, h("th", {}, "Tool"), h("th.num", {}, "Order is right"), h("th.num", {}, "At worst dearer by"), h("th", {}, ""))), h("tbody", {}, report.tools.map(row)))) : null];
 }
 
-export function outcomeCard({ run, project, act, tools = [] }) {
+const SAID = { left: "the left order", right: "the right order", equal: "that both are about equal" };
+
+// Answers that contradict each other were weighed; those that sit ill with the others can be taken back, one by one.
+function doubts(report, takeBack) {
+  if (!report) return null;
+  const row = (entry) => h("li", {}, h("span", {}, h("b", {}, entry.tool_name), `: you chose ${SAID[entry.value] ?? entry.value}. ${entry.difference}`), h("button.btn.small", { type: "button", dataset: { key: `doubt-${entry.answer_id}` }, onclick: () => takeBack(entry) }, icon("undo"), "Take it back"));
+  return [report.consistency?.text ? h("p", {}, report.consistency.text) : null,
+    report.unclear?.length ? h("div.note.warn.doubts", {}, icon("warn"), h("div", {}, h("p", {}, `${report.unclear.length === 1 ? "This answer sits" : "These answers sit"} ill with the others. All were weighed against each other, so nothing has to be done.`), h("ul", {}, report.unclear.map(row)))) : null];
+}
+
+export function outcomeCard({ run, project, act, tools = [], takeBack }) {
   const outcome = OUTCOMES[run.state]?.(run);
   if (!outcome) return null;
   const details = [run.message, typeof run.error === "string" ? run.error : run.error?.detail].filter(Boolean);
   return h("section.card.outcome", { "aria-label": "How it ended" }, h(`span.chip${outcome.tone ? `.${outcome.tone}` : ""}`, {}, icon(outcome.mark), `${{ performance: "Learning", effort: "Preferences", exception: "One tool" }[run.kind]}, ${ago(run.updated_at)}`),
-    h("h2", {}, outcome.title), h("p", {}, outcome.text), [...new Set(details)].map((text) => h("p", {}, text)), chances(run.report, project), h("div.actions", {}, outcomeActions(run, project, act, tools)));
+    h("h2", {}, outcome.title), h("p", {}, outcome.text), [...new Set(details)].map((text) => h("p", {}, text)), doubts(run.report, takeBack), chances(run.report, project), h("div.actions", {}, outcomeActions(run, project, act, tools)));
 }

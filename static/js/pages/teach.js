@@ -49,6 +49,14 @@ async function undo(given = state.answers.at(-1)) {
   toast("Answer taken back: the question is open again");
 }
 
+// One answer alone: the question opens again, what was answered later stays.
+async function takeBack(entry) {
+  await post(`/answers/${encodeURIComponent(entry.answer_id)}/undo?keep_later=true`);
+  state.answers = state.answers.filter((other) => other.id !== entry.answer_id);
+  await load();
+  toast(`Answer taken back: the question about ${entry.tool_name} is open again`);
+}
+
 async function fileRead(report) {
   state.answers.push(...report.applied);
   await load();
@@ -156,7 +164,7 @@ async function drawEnded() {
   if (run.state === "converged" && run.kind === "performance") cards.querySelectorAll(".btn.primary").forEach((button) => button.classList.remove("primary"));
   else if (["stalled", "failed", "cancelled", "converged", "infeasible"].includes(run.state)) cards.querySelectorAll(".btn.primary").forEach((button) => button.classList.remove("primary"));
   training.node.open = false;
-  fill(shell.main, head(`The last run used ${plural(run.tools.length, "demonstration")}.`), notes.node, outcomeCard({ run, project: shell.project, act: runAction, tools }), cards, training.node, history());
+  fill(shell.main, head(`The last run used ${plural(run.tools.length, "demonstration")}${run.authors.length ? ` of ${run.authors.join(" and ")}` : ""}.`), notes.node, outcomeCard({ run, project: shell.project, act: runAction, tools, takeBack: (entry) => takeBack(entry).catch(complain) }), cards, training.node, history());
 }
 
 function history() {
