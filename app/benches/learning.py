@@ -57,6 +57,8 @@ def _synthetic(shown: Shown) -> Iterator[Figure]:
     yield Figure(group, "test tools hit", _hits(unseen, weights), "of 4", 4, "at least", _sizes(unseen, weights))
     yield Figure(group, "answers, with a stop of its own", runs[0].answers, "", 2, "at most")
     yield Figure(group, "cpu, warm", min(r.cpu_s for r in runs[1:]) * 1e3, "ms", 150, "at most")
+    ready = min(r.longest_s for r in runs[1:]) * 1e3
+    yield Figure(group, "from an answer to the next question, longest, warm", ready, "ms", 100, "at most", "cpu")
     alone = certify(trained).weights
     yield Figure(group, "no answers: training tools hit", _hits(trained, alone), "of 6", 6, "at least", _sizes(trained, alone))
     yield Figure(group, "no answers: test tools hit", _hits(unseen, alone), "of 4")

@@ -29,6 +29,7 @@ class Taught:
     shown: int  # tools on which neither order was right, so that the expert has to record one
     wrong: int  # other tools of interest whose best order under the expert's weights is not the cheapest
     cpu_s: float  # of the learner, without the expert's thinking
+    longest_s: float  # cpu from an answer to the next question or the end, the longest
 
 
 def teach(
@@ -39,19 +40,20 @@ def teach(
     parameters: CertifiedParameters = UNTIL_SURE,
 ) -> Taught:
     """Answer as an expert of known weights until the run stops of its own."""
-    started, spent = time.process_time(), 0.0
+    started, spent, longest = time.process_time(), 0.0, 0.0
     state, answers, memory = start_certified(demonstrations, tools, parameters, seed), dict[str, str](), Memory.empty()
     while True:
         result = certified_step(demonstrations, tools, parameters, state, answers, memory)
         state = result.state
-        spent += time.process_time() - started
+        took = time.process_time() - started
+        spent, longest = spent + took, max(longest, took if answers else 0.0)
         if result.outcome != "questions":
             break
         answers |= {q.fingerprint: reply(tools[q.tool], q, truth) for q in result.questions}
         started = time.process_time()
     shown = {q.tool for q in state.asked if answers[q.fingerprint] == "both_wrong"}
     wrong = [t for t, p in enumerate(tools) if t not in shown and judge(p, result.weights, shortest_sequence(p, truth).sequence).gap > SAME]
-    return Taught(result.weights, len(answers), len(shown), len(wrong), spent)
+    return Taught(result.weights, len(answers), len(shown), len(wrong), spent, longest)
 
 
 def reply(problem: SequencingProblem, asked: PairQuestion, truth: Array) -> str:
