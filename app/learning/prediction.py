@@ -37,13 +37,13 @@ class Prediction:
 def predict(
     problem: SequencingProblem,
     policy: Policy,
-    should_stop: Callable[[], bool] = lambda: False,
+    should_stop: Callable[[], bool] = lambda: True,
     constraints: Constraints | None = None,
 ) -> Prediction:
     """The lowest-cost sequence; among equally cheap ones the one of least effort (Eq. 8), then the lowest region ids.
 
     Where the sequence can't be proved the cheapest, a lower bound says how far it may be off; `should_stop` ends the search
-    for a better bound, and never changes the sequence.
+    for a better bound (by default the first one will do), and never changes the sequence.
 
     Raises:
         StalePolicy: The policy belongs to another feature set, version or interactions.

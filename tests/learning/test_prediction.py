@@ -1,5 +1,6 @@
 """A policy on a tool, the scripted expert, and differences in words."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -92,7 +93,8 @@ def test_differences_in_words(left, right, text):
 
 def test_too_many_regions_come_with_a_bound_that_patience_only_improves():
     problem = problem_for(grid_graph(5, 6, 3))
-    hasty, patient = predict(problem, POLICY, should_stop=lambda: True), predict(problem, POLICY)
+    asked = itertools.count()
+    hasty, patient = (predict(problem, POLICY, should_stop=lambda most=most: next(asked) >= most) for most in (0, 150))
     assert not patient.proved
     assert hasty.sequence == patient.sequence
     assert 0 < hasty.bound < patient.bound < patient.cost
