@@ -96,81 +96,97 @@ def fit_quadric(m, weight, q):  # pragma: no cover - compiled
 
 
 @kernel
-def fit_cone(m, weight, out):  # pragma: no cover - compiled
-    """Cost of the best circular cone; fills curvature at the middle (signed, 1 / distance to the axis along the normal) and axis.
+def _cone_axis(m, axis):  # pragma: no cover - compiled
+    """Fill the direction along which normals vary least; returns by how much they do (int), and the cosine between them and it."""
+    varying = np.empty((3, 3))
+    for a in range(3):
+        for b in range(3):
+            varying[a, b] = m[NORMAL2 + NORMAL2_AT[a, b]] - m[NORMAL + a] * m[NORMAL + b] / m[AREA]
+    least = max(smallest_eigen(varying, axis), 0.0)
+    return least, (m[NORMAL] * axis[0] + m[NORMAL + 1] * axis[1] + m[NORMAL + 2] * axis[2]) / m[AREA]
 
-    The axis is the direction along which normals all have the same component; with it the cone is linear in what is left.
-    """
-    w, area = m[0], m[AREA]
-    work, spread, s2 = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    axis, g, c, sx = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+
+@kernel
+def _about_centroid(m, g, spread):  # pragma: no cover - compiled
+    """Fill the centroid and the spread of the positions about it."""
     for a in range(3):
-        g[a] = m[PRODUCT[0, 1 + a]] / w
-        for b in range(3):
-            work[a, b] = m[NORMAL2 + NORMAL2_AT[a, b]] - m[NORMAL + a] * m[NORMAL + b] / area
+        g[a] = m[PRODUCT[0, 1 + a]] / m[0]
     for a in range(3):
         for b in range(3):
-            spread[a, b] = m[PRODUCT[1 + a, 1 + b]] - w * g[a] * g[b]
-    varying = max(smallest_eigen(work, axis), 0.0)
-    lean = (m[NORMAL] * axis[0] + m[NORMAL + 1] * axis[1] + m[NORMAL + 2] * axis[2]) / area
-    if abs(lean) > STEEPEST or abs(lean) < SHALLOWEST:
-        return NO_FIT
-    slope2 = lean * lean / (1 - lean * lean)
-    for a in range(3):
-        for b in range(3):
-            s2[a, b] = (1.0 if a == b else 0.0) - (1 + slope2) * axis[a] * axis[b]
-    row = np.zeros(10)
+            spread[a, b] = m[PRODUCT[1 + a, 1 + b]] - m[0] * g[a] * g[b]
+
+
+@kernel
+def _leaning(m, s2, g, sq):  # pragma: no cover - compiled
+    """Fill sq with int s x monomial for s = (x - g)^T s2 (x - g); returns int s^2."""
+    row, ss = np.zeros(10), 0.0
     for a in range(3):
         sg = s2[a, 0] * g[0] + s2[a, 1] * g[1] + s2[a, 2] * g[2]
         row[0] += g[a] * sg
         row[1 + a] -= 2 * sg
         for b in range(3):
             row[SQUARE[a, b]] += s2[a, b]
-    ss, sq = 0.0, np.zeros(10)
     for i in range(10):
+        sq[i] = 0.0
         for j in range(10):
             sq[i] += row[j] * m[PRODUCT[i, j]]
         ss += row[i] * sq[i]
-    scale = spread[0, 0] + spread[1, 1] + spread[2, 2]
+    return ss
+
+
+@kernel
+def _slope_of(m, s2, spread, g, c):  # pragma: no cover - compiled
+    """Mean square of |grad f| / 2, and int n . grad f / 2, for f = s - 2 c . (x - g) - d."""
+    steep2, radial = c[0] * c[0] + c[1] * c[1] + c[2] * c[2], 0.0
     for a in range(3):
-        sx[a] = sq[1 + a] - g[a] * sq[0]
-        c[a] = sx[a] / (2 * scale)
         for b in range(3):
-            work[a, b] = spread[a, b] / scale
-    if scale <= 0 or not solve3(work, c):
-        return NO_FIT
-    error, steep2 = ss - sq[0] * sq[0] / w, c[0] * c[0] + c[1] * c[1] + c[2] * c[2]
-    radial = 0.0
-    for a in range(3):
-        error -= 4 * c[a] * sx[a]
-        for b in range(3):
-            error += 4 * c[a] * spread[a, b] * c[b]
             part = 0.0
             for k in range(3):
                 part += s2[a, k] * spread[k, b]
-            steep2 += part * s2[a, b] / w
+            steep2 += part * s2[a, b] / m[0]
             radial += s2[a, b] * (m[NORMAL_CENTRE + 3 * a + b] - m[NORMAL + a] * g[b])
         radial -= m[NORMAL + a] * c[a]
+    return steep2, radial
+
+
+@kernel
+def fit_cone(m, weight, out):  # pragma: no cover - compiled
+    """Cost of the best circular cone; fills curvature at the middle (signed, 1 / distance to the axis along the normal) and axis.
+
+    The axis is the direction along which normals all have the same component; with it the cone is linear in what is left:
+    f = s - 2 c . (x - g) - d with s = (x - g)^T s2 (x - g), s2 = identity - (1 + slope^2) axis axis^T, g the centroid.
+    """
+    axis, g, c, sx, sq = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(10)
+    spread, s2 = np.empty((3, 3)), np.empty((3, 3))
+    varying, lean = _cone_axis(m, axis)
+    if abs(lean) > STEEPEST or abs(lean) < SHALLOWEST:
+        return NO_FIT
+    _about_centroid(m, g, spread)
+    slope2 = lean * lean / (1 - lean * lean)
+    for a in range(3):
+        for b in range(3):
+            s2[a, b] = (1.0 if a == b else 0.0) - (1 + slope2) * axis[a] * axis[b]
+    ss, scale = _leaning(m, s2, g, sq), spread[0, 0] + spread[1, 1] + spread[2, 2]
+    for a in range(3):
+        sx[a] = sq[1 + a] - g[a] * sq[0]
+        c[a] = sx[a] / (2 * scale)
+    if scale <= 0 or not solve3(spread / scale, c):
+        return NO_FIT
+    error = ss - sq[0] * sq[0] / m[0] - 4 * np.dot(c, sx) + 4 * np.dot(c, spread @ c)
+    steep2, radial = _slope_of(m, s2, spread, g, c)
     if steep2 <= 0:
         return NO_FIT
-    steep = np.sqrt(steep2)
-    out[1] = (1.0 if radial >= 0 else -1.0) / steep
-    for a in range(3):
-        out[2 + a] = axis[a]
+    out[1] = (1.0 if radial >= 0 else -1.0) / np.sqrt(steep2)
+    out[2:5] = axis
     # |grad f| grows with the distance h from the apex; what it varies by on a true cone is no error of the normals
-    var, apex, tip = 0.0, 0.0, -sq[0] / w
-    for a in range(3):
-        apex += c[a] * axis[a] / slope2
-        tip -= c[a] * c[a]
-        for b in range(3):
-            var += axis[a] * spread[a, b] * axis[b] / w
+    var, apex = np.dot(axis, spread @ axis) / m[0], np.dot(c, axis) / slope2
     if apex * apex < APEX * var:
         return NO_FIT  # two nappes
-    tip += apex * apex * slope2 * (1 + slope2)  # f at the apex, 0 on a true cone; what is left is a hyperboloid
-    error = max(error, 0.0) + w * tip * tip
+    # f at the apex, 0 on a true cone; what is left is a hyperboloid
+    tip = apex * apex * slope2 * (1 + slope2) - sq[0] / m[0] - np.dot(c, c)
     mean2 = slope2 * (1 + slope2) * (apex * apex + var)  # of |grad f| on a true cone
-    astray = max(1 - radial * radial / (area * area * steep2) - var / (apex * apex + var), 0.0) + abs(mean2 / steep2 - 1)
-    return error / (4 * steep2) + weight * weight * (area * astray + varying)
+    astray = max(1 - radial * radial / (m[AREA] * m[AREA] * steep2) - var / (apex * apex + var), 0.0) + abs(mean2 / steep2 - 1)
+    return (max(error, 0.0) + m[0] * tip * tip) / (4 * steep2) + weight * weight * (m[AREA] * astray + varying)
 
 
 @kernel
