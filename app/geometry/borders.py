@@ -132,11 +132,14 @@ def _outer_loop(ends: Integers, length: Array) -> NDArray[np.bool_]:
 def _outside(points: Array) -> Array:
     """Points that may lie on the convex hull: not inside the polygon of those that are farthest out in some directions."""
     at = np.linspace(0, 2 * np.pi, 16, endpoint=False)
-    farthest = points[np.argmax(points @ np.stack([np.cos(at), np.sin(at)]), axis=0)]
-    way = np.roll(farthest, -1, axis=0) - farthest
-    left = np.stack([-way[:, 1], way[:, 0]])
-    inside = (points @ left > np.einsum("ik,ki->k", left, farthest) + 1e-12 * np.abs(left).sum()).all(axis=1)
-    return points[~inside] if (np.linalg.norm(way, axis=1) > 0).all() else points
+    x, y = np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1])
+    farthest = [int(np.argmax(c * x + s * y)) for c, s in zip(np.cos(at), np.sin(at), strict=True)]
+    inside = np.ones(len(points), bool)
+    for i, k in zip(farthest, farthest[1:] + farthest[:1], strict=True):
+        way = points[k] - points[i]
+        if way.any():
+            inside &= way[0] * (y - y[i]) - way[1] * (x - x[i]) > 1e-9 * (way @ way)
+    return points[~inside]
 
 
 def smallest_rectangle(points: Array) -> Array:
