@@ -1,5 +1,6 @@
 """Fixtures shared by all tests: a data folder of its own per test, the whole application on it, a real server process."""
 
+import ctypes
 import json
 import os
 import signal
@@ -25,6 +26,7 @@ with warnings.catch_warnings():
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = ROOT.parent / "shared"
 START_LIMIT_S = 90
+PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl
 
 
 @pytest.fixture
@@ -93,6 +95,12 @@ def api(client: TestClient) -> Api:
     return Api(client)
 
 
+def end_with_parent() -> None:
+    """In a new process: be killed when the tests end, however they end; a session of its own outlives them otherwise."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(PARENT_DEATH_SIGNAL, signal.SIGKILL)
+
+
 @dataclass
 class LiveServer:
     """The real `serve` process on a free port; can be killed and started again on the same data."""
@@ -115,11 +123,15 @@ class LiveServer:
         command = [sys.executable, "-m", "app.cli", "serve", "--port", str(self.port), "--data", str(self.data)]
         with self.log.open("ab") as log:
             environment = {**os.environ, **self.environment}
-            self.process = subprocess.Popen(command, cwd=ROOT, stdout=log, stderr=log, env=environment, start_new_session=True)
+            self.process = subprocess.Popen(
+                command, cwd=ROOT, stdout=log, stderr=log, env=environment, start_new_session=True, preexec_fn=end_with_parent
+            )
         end = time.monotonic() + START_LIMIT_S
         while not self._answers():
             assert self.process.poll() is None, f"the server ended: {self.log.read_text()}"
-            assert time.monotonic() < end, f"the server does not answer: {self.log.read_text()}"
+            if time.monotonic() > end:
+                self.kill()  # no fixture would: it has not been handed out yet
+                raise AssertionError(f"the server does not answer: {self.log.read_text()}")
             time.sleep(0.05)
 
     def _answers(self) -> bool:
@@ -165,7 +177,7 @@ def live_server(tmp_path: Path) -> Iterator[LiveServer]:
 @pytest.fixture
 def live_api(live_server: LiveServer) -> Iterator[Api]:
     """The REST interface of the real server process."""
-    with httpx.Client(base_url=live_server.address, timeout=60) as connection:
+    with httpx.Client(base_url=live_server.address, timeout=180) as connection:
         yield Api(connection)
 
 

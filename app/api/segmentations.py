@@ -86,6 +86,7 @@ class Region(Row):
     free_border_mm: float | None
     locked: bool
     hidden: bool
+    colour: Annotated[str | None, Field(description="What most of it is painted in the CAD file, #rrggbb.")]
 
 
 class RegionList(Row):

@@ -25,6 +25,7 @@ class ClickedPoint(Body):
 Selection = Annotated[list[RegionId], Field(max_length=200, description="Selected regions.")]
 Points = Annotated[list[ClickedPoint], Field(max_length=100, description="Clicked points of a line, a plane or a piece.")]
 Level = Annotated[int, Field(ge=1, le=1000, description="1: the largest piece under the click, 2: the next smaller one.")]
+Colours = Annotated[Literal["regions", "cad"], Field(description="Tints that tell regions apart, or what the CAD file paints them in.")]
 Pointing = Literal["select", "points", "piece"]
 
 
@@ -37,7 +38,7 @@ class NewSession(Body):
 class Scene(Body):
     """What the view shows."""
 
-    mode: Literal["empty", "tool", "record", "sequence", "robot", "edit"]
+    mode: Literal["empty", "file", "tool", "record", "sequence", "robot", "edit"]
     tool_id: Id | None = None
     sequence: RegionOrder | None = None
     step: Annotated[int, Field(ge=0, le=100_000, description="Regions after this step are undone; null: all done.")] | None = None
@@ -45,12 +46,15 @@ class Scene(Body):
     highlight: list[RegionId] | None = None
     playback_id: Id | None = None
     dark: bool | None = None
+    body: Annotated[Id | None, Field(description="Mode file: the body that is chosen; `highlight` counts bodies from 0.")] = None
+    up: Annotated[Literal["+x", "-x", "+y", "-y", "+z", "-z"] | None, Field(description="Mode file: what of its frame points up.")] = None
     pointing: Pointing | None = None
     selection: Selection | None = None
     points: Points | None = None
     level: Level | None = None
     path: Literal["line", "plane"] | None = None
     closed: bool | None = None
+    colours: Colours | None = None
 
 
 class EditingChanges(Body):
@@ -62,6 +66,7 @@ class EditingChanges(Body):
     level: Level | None = None
     path: Literal["line", "plane"] | None = None
     closed: bool | None = None
+    colours: Colours | None = None
     hover: RegionId | None = None
 
 

@@ -117,6 +117,11 @@ def _faces_of(mesh: Any, count: int, transform: Array) -> list[CadFace]:
     return [from_record(records.get(k)).moved(transform[:3, :3] / scale, transform[:3, 3], scale) for k in range(count)]
 
 
+def _encoded(linear: Array) -> list[int]:
+    """sRGB values 0..255 of linear light in [0, 1], in which the reader's materials are given."""
+    return np.rint(255 * np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)).astype(int).tolist()
+
+
 def _colours(data: bytes, scene: Any, entries: list[Entry]) -> Integers:
     """Colour of each triangle as 0xRRGGBB, -1 without: the file is read again with its colours, triangles are matched by place."""
     diagonal = float(np.linalg.norm(scene.extents))
@@ -126,7 +131,7 @@ def _colours(data: bytes, scene: Any, entries: list[Entry]) -> Integers:
         factor = getattr(getattr(getattr(mesh, "visual", None), "material", None), "baseColorFactor", None)
         if not isinstance(mesh, trimesh.Trimesh) or factor is None:
             continue
-        red, green, blue = (int(c) for c in np.asarray(factor)[:3])
+        red, green, blue = _encoded(np.asarray(factor, float)[:3] / 255)
         corners = np.asarray(mesh.vertices, float) @ transform[:3, :3].T + transform[:3, 3]
         centres.append(corners[mesh.faces].mean(axis=1))
         colours.append(np.full(len(mesh.faces), red << 16 | green << 8 | blue))

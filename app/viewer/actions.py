@@ -5,8 +5,10 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from app.geometry.preview import Preview
 from app.geometry.tool import Tool
 from app.robot.playback import Playback
+from app.viewer.palette import Rgb
 from app.workflow import editing_views, record, robot, sessions, tools
 from app.workflow.context import Context
 
@@ -24,6 +26,8 @@ class Actions:
     tool_state: Callable[[str], Json]
     get_ready: Callable[[str], None]
     piece_faces: Callable[[str], Any]
+    cad_colours: Callable[[str], tuple[Rgb | None, ...]]
+    file_preview: Callable[[str, str], Preview]
     pick: Callable[..., Any]
     select: Callable[[str, list[int]], Any]
     command: Callable[[str, str], Any]
@@ -40,6 +44,8 @@ def workflow_actions(ctx: Context) -> Actions:
         tool_state=lambda tool_id: tools.get_tool(ctx, tool_id)["edit"],
         get_ready=partial(editing_views.get_ready, ctx),
         piece_faces=partial(editing_views.piece_faces, ctx),
+        cad_colours=partial(editing_views.cad_colours, ctx),
+        file_preview=partial(tools.file_preview, ctx),
         pick=partial(sessions.pick_in_view, ctx),
         select=partial(editing_views.add_regions, ctx),
         command=partial(sessions.command_in_view, ctx),

@@ -7,6 +7,7 @@ from typing import Literal
 from app.viewer.palette import Rgb, faded, mixed, ramp, rgb, theme
 
 Outline = Literal["current", "differs", "conflict", "selected", "hover"]
+PAINT_SOFTENED = 0.45  # share of the surface colour in what the CAD file paints
 SELECTED_SHARE = 0.45  # of the signal colour in a selected region
 
 
@@ -43,6 +44,7 @@ class Progress:
     hover: int | None = None  # region under the pointer
     locked: frozenset[int] = frozenset()
     hidden: frozenset[int] = frozenset()
+    painted: tuple[Rgb | None, ...] = ()  # by the CAD file; empty: tints tell regions apart
 
 
 def paint(progress: Progress, names: Sequence[str], tints: Sequence[int], dark: bool) -> Picture:
@@ -55,7 +57,9 @@ def paint(progress: Progress, names: Sequence[str], tints: Sequence[int], dark: 
     looks: list[RegionLook] = []
     for region, name in enumerate(names):
         step = place.get(region)
-        colour = rgb(tint[tints[region] % len(tint)]) if step is None else colours[step]
+        colour = _ground(progress.painted[region], dark) if progress.painted else rgb(tint[tints[region] % len(tint)])
+        if step is not None:
+            colour = colours[step]
         if region in progress.locked:
             colour = rgb(theme(dark).body)
         if region in progress.selected:
@@ -71,6 +75,11 @@ def paint(progress: Progress, names: Sequence[str], tints: Sequence[int], dark: 
             )
         )
     return Picture(dark, tuple(looks))
+
+
+def _ground(painted: Rgb | None, dark: bool) -> Rgb:
+    """A CAD colour, softened so that the letter on it can be read; what has none looks like the body."""
+    return rgb(theme(dark).body) if painted is None else mixed(painted, rgb(theme(dark).surface), PAINT_SOFTENED)
 
 
 def _outline(region: int, progress: Progress) -> Outline | None:

@@ -19,8 +19,9 @@ from app.geometry.tool import Tool
 from app.robot.playback import Playback
 from app.viewer.actions import Actions, Json
 from app.viewer.arm import Arm, ground, progress_at, room_needed
+from app.viewer.file_nodes import FileNodes
 from app.viewer.marks import NOTHING, MarkNodes, marks_of
-from app.viewer.palette import tint_choice
+from app.viewer.palette import Rgb, tint_choice
 from app.viewer.picture import Progress, draft_progress, paint, sequence_progress
 from app.viewer.pointer import Background, Box, Pointer
 from app.viewer.projection import camera_for
@@ -63,7 +64,14 @@ class Refresh:
     """Something stored has changed."""
 
 
-Task = Clicked | Box | Background | Hover | Letter | Command | Refresh
+@dataclass(frozen=True)
+class BodyClicked:
+    """A click on a body of a file that is being asked about."""
+
+    number: int
+
+
+Task = BodyClicked | Clicked | Box | Background | Hover | Letter | Command | Refresh
 
 
 @dataclass(frozen=True)
@@ -115,9 +123,12 @@ class View:
         self._hover: int | None = None
         self._ready_for: str | None = None  # tool prepared for edits
         self._marked: tuple[frozenset[int], frozenset[int]] = (frozenset(), frozenset())  # locked, hidden
+        self._painted: tuple[Rgb | None, ...] = ()  # by the CAD file, where that is wished
         self._clock = Clock()
         self.server = open_server()
         self.stage = Stage(self.server, self._clicked)
+        self._file = FileNodes(self.server, self.stage, self._body_clicked)
+        self._file_shown: tuple[str, str, bool] | None = None
         self._pointer = Pointer(self.server, self.submit)
         self._marks = MarkNodes(self.server)
         self._add_hotkeys()
@@ -145,6 +156,9 @@ class View:
 
     async def _clicked(self, clicked: Clicked) -> None:
         self.submit(clicked)
+
+    async def _body_clicked(self, number: int) -> None:
+        self.submit(BodyClicked(number))
 
     def _add_hotkeys(self) -> None:
         add = self.server.gui.add_command
@@ -213,6 +227,8 @@ class View:
             case Clicked() | Background() | Box():
                 if self._tool is not None:
                     self._pointed(self._tool, command)
+            case BodyClicked(number):
+                self._actions.pick(self.sid, number)
             case Hover(region):
                 self._hover = region
                 self._advance()
@@ -241,11 +257,15 @@ class View:
         """Build the nodes again if the tool, the recording or the theme is another one."""
         tool_id, playback_id = self._scene.get("tool_id"), self._scene.get("playback_id")
         mode, dark = self._scene.get("mode", "empty"), bool(self._scene.get("dark"))
+        if mode == "file":
+            self._show_file(dark)
+            return
         tool = self._actions.tool_value(tool_id) if tool_id and mode != "empty" else None
         playback = self._recording(playback_id) if playback_id and mode == "robot" else None
         moved = not same_shape(tool, self._tool) or playback is not self._playback
         away = playback is not self._playback or not same_place(tool, self._tool)
-        if moved or dark != self._dark:
+        if moved or dark != self._dark or self._file_shown:
+            self._file_shown = None
             self._tool = None  # nothing to paint on, should the building fail
             self._marks.forget()
             self.stage.build(tool, dark, ground(playback) if playback is not None else None)
@@ -262,11 +282,23 @@ class View:
             self._get_ready(self._scene["tool_id"])
             state = self._actions.tool_state(self._scene["tool_id"])
             self._marked = frozenset(state["locked"]), frozenset(state["hidden"])
+            self._painted = self._actions.cad_colours(self._scene["tool_id"]) if self._scene.get("colours") == "cad" else ()
         else:
             self._hover = None
         if tool is not None:
             piece = self._actions.piece_faces(self.sid) if mode == "edit" and self._scene.get("points") else None
             self._marks.draw(tool, marks_of(tool, self._scene, piece) if mode == "edit" else NOTHING, dark)
+
+    def _show_file(self, dark: bool) -> None:
+        """The file a tool is to be made from, while its import asks."""
+        wanted = (self._scene["tool_id"], self._scene.get("up") or "+z", dark)
+        if wanted != self._file_shown:
+            self._tool, self._arm, self._playback, self._playback_shown, self._dark = None, None, None, None, dark
+            self._marks.forget()
+            self._pointer.listen(False)
+            self._file.build(self._actions.file_preview(*wanted[:2]), dark)
+            self._file_shown = wanted
+        self._file.paint(self._scene.get("body"), self._scene.get("highlight") or [], dark)
 
     def _get_ready(self, tool_id: str) -> None:
         """Have the tool prepared for edits beside this view's queue, once."""
@@ -313,7 +345,7 @@ class View:
         if mode == "edit":
             locked, hidden = self._marked
             selected = scene["selection"] if scene["pointing"] == "select" else ()  # else the points and lines are what matters
-            return Progress(selected=frozenset(selected), hover=self._hover, locked=locked, hidden=hidden)
+            return Progress(selected=frozenset(selected), hover=self._hover, locked=locked, hidden=hidden, painted=self._painted)
         if mode == "robot" and self._playback is not None:
             return progress_at(self._playback, now)
         if mode in ("sequence", "robot"):

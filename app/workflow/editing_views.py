@@ -6,6 +6,7 @@ import numpy as np
 from sqlmodel import Session, select
 
 from app.errors import AppError, InvalidInput
+from app.geometry.cad_faces import Colour
 from app.geometry.pieces import Piece, piece_under
 from app.geometry.regions import warm_up
 from app.geometry.segmentation import SegmentationParameters
@@ -20,7 +21,7 @@ from app.workflow.values import Values
 
 Json = dict[str, Any]
 
-EDITING: Json = {"pointing": "select", "selection": [], "points": [], "level": 1, "path": None, "closed": False}
+EDITING: Json = {"pointing": "select", "selection": [], "points": [], "level": 1, "path": None, "closed": False, "colours": "regions"}
 MOST_POINTS = 100
 
 
@@ -144,6 +145,17 @@ def get_ready(ctx: Context, tool_id: str) -> None:
         part, tree = ctx.values.part(part_sha), ctx.values.part_tree(tree_sha)
         if part_sha is not None and part is not None and tree is not None:
             ctx.values.patches(part_sha, part, tree, SegmentationParameters())
+
+
+def cad_colours(ctx: Context, tool_id: str) -> tuple[Colour | None, ...]:
+    """The colours the CAD file gives the regions of a tool."""
+
+    def query(session: Session) -> tuple[Colour | None, ...]:
+        row = present(session, ToolRow, tool_id)
+        cut = ready_segmentation(session, row)
+        return ctx.values.colours(ctx.values.tool(session, cut), cut.tool_sha, row.part_sha)
+
+    return ctx.store.read(query)
 
 
 def follow_edit(values: Values, session: Session, row: ToolRow, after: After) -> None:

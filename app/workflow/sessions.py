@@ -17,7 +17,7 @@ Json = dict[str, Any]
 
 EMPTY_SCENE: Json = {"mode": "empty", "tool_id": None}
 AT_START: Json = {"playing": False, "time": 0.0, "speed": 1.0, "since": None}
-FIELDS = ("mode", "tool_id", "sequence", "step", "differs", "highlight", "playback_id", "dark")
+FIELDS = ("mode", "tool_id", "sequence", "step", "differs", "highlight", "playback_id", "dark", "body", "up")
 
 
 def create_session(ctx: Context, project_id: str) -> Json:
@@ -167,8 +167,8 @@ def _duration(session: Session, scene: Json) -> float | None:
 
 def _check_scene(session: Session, project_id: str, scene: Json) -> None:
     mode, tool_id, playback_id = scene.get("mode"), scene.get("tool_id"), scene.get("playback_id")
-    if mode not in ("empty", "tool", "record", "sequence", "robot", "edit"):
-        raise InvalidInput(f"A view shows empty, tool, record, sequence, robot or edit, not {mode!r}.")
+    if mode not in ("empty", "file", "tool", "record", "sequence", "robot", "edit"):
+        raise InvalidInput(f"A view shows empty, file, tool, record, sequence, robot or edit, not {mode!r}.")
     if mode != "empty" and tool_id is None:
         raise InvalidInput(f"A view in the mode {mode} needs a tool_id.")
     if tool_id is not None and present(session, ToolRow, tool_id).project_id != project_id:

@@ -8,8 +8,10 @@ import numpy as np
 import trimesh
 from sqlmodel import Session
 
-from app.errors import Conflict, InvalidInput, RunActive
+from app.errors import Conflict, InvalidInput, NotFound, RunActive
 from app.geometry.importing import ACCEPTED, METRES, UP, read_file
+from app.geometry.parsed import ParsedFile
+from app.geometry.preview import Preview, preview
 from app.geometry.region_table import read_region_table
 from app.geometry.segmentation import SegmentationParameters
 from app.geometry.tool import Tool
@@ -208,6 +210,19 @@ def restore_tool(ctx: Context, tool_id: str) -> Json:
 def tool_value(ctx: Context, tool_id: str) -> Tool:
     """The tool as the core sees it, kept in memory."""
     return ctx.store.read(lambda session: ctx.values.tool(session, ready_segmentation(session, present(session, ToolRow, tool_id))))
+
+
+def file_preview(ctx: Context, tool_id: str, up: str) -> Preview:
+    """The bodies of the file a tool was made from, before it is cleaned.
+
+    Raises:
+        NotFound: The tool has no file, or is from before its triangles were kept.
+        TooLarge: Too many triangles to be drawn.
+    """
+    sha = ctx.store.read(lambda session: present(session, ToolRow, tool_id).parsed_sha)
+    if sha is None:
+        raise NotFound("There is no file to show.")
+    return preview(ParsedFile.from_bytes(ctx.store.artifacts.get(sha)), up)
 
 
 def segmentation_value(ctx: Context, segmentation_id: str) -> Tool:

@@ -3,6 +3,7 @@
 
 import { fill, h } from "./dom.js";
 import { icon } from "./icons.js";
+import { plural } from "./words.js";
 
 const KINDS = {
   before: { two: true, label: "before", say: (a, b) => `${a} before ${b}` },
@@ -49,7 +50,9 @@ export class Wishes {
     this.from = h("select", { "aria-label": "Region" });
     this.to = h("select", { "aria-label": "Other region" });
     this.button = h("button.btn.small", { type: "button", onclick: () => this.add() }, "Add");
-    this.node = h("section.wishes", { "aria-label": "Wishes about the order" });
+    this.count = h("span.muted");
+    this.body = h("div");
+    this.node = h("details.wishes", { "aria-label": "Wishes about the order" }, h("summary", { dataset: { key: "wishes" } }, icon("right", "caret"), h("b", {}, "The order must keep"), this.count), this.body);
   }
 
   /** Another tool: its region names by number, and what its plan respects. */
@@ -107,7 +110,8 @@ export class Wishes {
       return h("button.chip", { type: "button", "aria-label": `Take away: ${words}`, disabled: this.busy, onclick: () => this.change(withoutWish(this.wishes, kind, at)) }, words, icon("cross"));
     });
     const hint = this.picked === null ? `Choose from the lists, or click ${two ? "two regions" : "a region"} on the tool.` : two ? `${this.names[this.picked]}, then? Click the other region.` : `${this.names[this.picked]} chosen.`;
-    fill(this.node, h("h3", {}, "The order must keep"), chips.length ? h("div.wish-chips", {}, chips) : null,
+    this.count.textContent = chips.length ? plural(chips.length, "wish", "wishes") : "nothing yet";
+    fill(this.body, chips.length ? h("div.wish-chips", {}, chips) : null,
       h("div.wish-row", {}, this.from, this.kind, two ? this.to : null, this.button),
       h("p.small.muted", {}, hint), this.fault ? h("p.wish-fault", { role: "alert" }, this.fault) : null);
   }

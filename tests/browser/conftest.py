@@ -62,7 +62,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LiveServer]:
 @pytest.fixture(scope="module")
 def api_of_all(server: LiveServer) -> Iterator[Api]:
     """Its REST interface."""
-    with httpx.Client(base_url=server.address, timeout=60) as connection:
+    with httpx.Client(base_url=server.address, timeout=180) as connection:
         yield Api(connection)
 
 

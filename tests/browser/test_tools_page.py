@@ -210,6 +210,31 @@ def test_a_demonstration_on_an_older_cut_says_so(desk: Studio) -> None:
     expect(note).to_be_hidden()
 
 
+def test_an_order_is_carried_over_to_the_regions_of_today(desk: Studio) -> None:
+    """A region divided and put together again has another number: the note offers to carry the order over, and it arrives."""
+    page = desk.page
+    row, _ = editing(desk, "Bend 01")
+
+    def middles() -> list[list[float]]:
+        """Where the expert goes, in order."""
+        regions = desk.api.get(f"/tools/{row['id']}/regions")["items"]
+        order = desk.api.get(f"/demonstrations/{desk.tool('Bend 01')['demonstration_id']}")["sequence"]
+        return [regions[region]["centroid_mm"] for region in order]
+
+    before = middles()
+    for key in ("a", "Shift+G", "Enter", "Shift+M"):  # the pieces stay selected, so they are merged at once
+        page.keyboard.press(key)
+    note = page.locator(".old-demonstrations")
+    expect(note).to_contain_text("every region still has its counterpart")
+    assert not desk.tool("Bend 01")["demonstrated"]
+    note.get_by_role("button", name="Carry over").click()
+    expect(page.locator(".next")).to_contain_text("It has a demonstration")
+    expect(note).to_be_hidden()
+    after = desk.tool("Bend 01")
+    assert after["demonstration_id"] != row["demonstration_id"]
+    np.testing.assert_allclose(middles(), before, atol=1e-6)
+
+
 def test_a_dropped_file_becomes_a_tool(desk: Studio, server: LiveServer, api_of_all: Api) -> None:
     """From the drop to regions in under a minute, few or many by the slider; what is no CAD is refused beside the list."""
     page = desk.page

@@ -11,7 +11,7 @@ from tests.geometry.cad_files import exported, glb
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(600)]
 
-expect.set_options(timeout=60_000)
+expect.set_options(timeout=180_000)  # the first part on a machine waits for kernels to be compiled
 
 DROP = """([name, content]) => {
   const bytes = Uint8Array.from(atob(content), (c) => c.charCodeAt(0));
@@ -89,7 +89,13 @@ def test_one_of_several_bodies_and_another_later(tools_page: Page, studio: Studi
     expect(form.locator('label:has([value="2"])')).to_contain_text("clamp")
     expect(form.locator('label:has([value="2"])')).to_contain_text("30 × 20 × 12.5 mm")
     tools_page.screenshot(path=tmp_path / "bodies.png")
-    form.locator('[name="body"][value="2"]').check()
+    view = tools_page.locator(".view3d")
+    expect(view).to_have_attribute("aria-label", "3D view of the file fixture.glb with +z up")
+    form.locator('[name="up"][value="+x"]').check()  # it stands as it would
+    expect(view).to_have_attribute("aria-label", "3D view of the file fixture.glb with +x up")
+    with tools_page.expect_response(lambda answer: answer.url.endswith("/scene") and answer.json()["scene"].get("body") == "2"):
+        form.locator('[name="body"][value="2"]').check()
+    form.locator('[name="up"][value="+z"]').check()
     form.get_by_role("button", name="Cut it into regions").click()
     expect(tools_page.locator("tr[data-region]").first).to_be_visible()
     assert studio.tool("fixture")["body"] == "2"

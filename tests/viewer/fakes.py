@@ -10,6 +10,8 @@ from functools import lru_cache
 from typing import Any
 
 import msgspec
+import numpy as np
+import trimesh
 import uvicorn
 import viser
 import websockets
@@ -18,6 +20,8 @@ from fastapi import FastAPI, Request, Response
 
 from app.errors import InvalidInput, NotFound
 from app.geometry.moulds import sample_moulds
+from app.geometry.parsed import Body, ParsedFile
+from app.geometry.preview import preview
 from app.geometry.regions import measure
 from app.geometry.tool import Tool
 from app.robot.playback import Playback
@@ -31,6 +35,16 @@ SUBPROTOCOL = f"viser-v{viser.__version__}"
 def sample_tool(name: str = "Trough 06") -> Tool:
     mould = next(mould for mould in sample_moulds() if mould.name == name)
     return measure(mould.mesh, mould.labels)
+
+
+def two_boxes() -> ParsedFile:
+    """A file with a large box and a small one beside it, in its own frame and units."""
+    large = trimesh.creation.box((40, 20, 10))
+    small = trimesh.creation.box((4, 4, 4), trimesh.transformations.translation_matrix((30, 0, 0)))
+    bodies = [Body(name, (0.0, 0.0, 0.0), 12, mesh.area, True, "+z") for name, mesh in (("plate", large), ("pin", small))]
+    faces = np.concatenate([large.faces, small.faces + 8])
+    none = np.full(24, -1)
+    return ParsedFile(np.concatenate([large.vertices, small.vertices]), faces, none, np.repeat([0, 1], 12), tuple(bodies), (), "mm", 0, 0)
 
 
 @dataclass
@@ -108,6 +122,8 @@ class FakeWorkflow:
             tool_state=lambda _tool: self.state,
             get_ready=self.ready.append,
             piece_faces=lambda _sid: None,
+            cad_colours=lambda _tool: (None,) * self.tool.n,
+            file_preview=lambda _tool, up: preview(two_boxes(), up),
             pick=self.pick,
             select=self.select,
             command=self.command,

@@ -91,6 +91,17 @@ function answering(tool, button, fault, { onChanged, reload }) {
   };
 }
 
+// What would become of the file by the answers given so far, for the 3D view; a body is pointed at by hovering its line.
+function looked(form, body, onLook) {
+  const look = (event) => {
+    const hovered = event.type === "pointerover" ? event.target.closest(".body-list label") : null;
+    const at = hovered ? body.choices.findIndex((choice) => choice.id === hovered.querySelector("input").value) : -1;
+    const several = hovered && body.choices[at].id === "all";
+    onLook({ body: form.elements.body?.value ?? null, up: form.elements.up?.value ?? null, highlight: at < 0 || several ? [] : [at] });
+  };
+  for (const type of ["change", "pointerover", "pointerleave"]) form.addEventListener(type, look);
+}
+
 export function importQuestions(tool, handlers) {
   const { body, units, up } = tool.questions ?? {};
   const fault = h("p.error-text", { role: "alert" });
@@ -98,6 +109,7 @@ export function importQuestions(tool, handlers) {
   const form = h("form.ask-form", { onsubmit: answering(tool, button, fault, handlers) }, body ? bodyChoices(body, tool.units, body.guess) : null,
     units ? unitChoices(units.choices, units.guess ?? "mm", units.extents) : null, up ? upChoices(up.choices, up.guess, up.guess) : null, fault, button);
   follow(form, { body, units, up });
+  looked(form, body, handlers.onLook);
   return form;
 }
 

@@ -19,6 +19,7 @@ export class Editor {
     this.rows = 2;
     this.columns = 3;
     this.closed = false;
+    this.colours = "regions"; // or "cad": as painted in the file
     this.to = null;
     this.hovered = null;
     this.busy = "";
@@ -155,6 +156,14 @@ export class Editor {
 
   get leavable() {
     return this.mode !== "select" || this.selection.length > 0;
+  }
+
+  get painted() {
+    return this.regions.some((region) => region.colour);
+  }
+
+  paint() {
+    if (this.painted) this.change({ colours: this.colours === "cad" ? "regions" : "cad" });
   }
 
   backspace() {

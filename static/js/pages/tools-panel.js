@@ -12,8 +12,8 @@ import { RegionTable } from "./tools-regions.js";
 
 export class ToolPanel {
   // list: the node with all tools, shown here as a tab unless the window is wide enough for a column of its own.
-  constructor({ editor, list, onChanged, onCut, onCarried, reload }) {
-    Object.assign(this, { editor, list, onChanged, reload });
+  constructor({ editor, list, onChanged, onLook, onCut, onCarried, reload }) {
+    Object.assign(this, { editor, list, onChanged, onLook, reload });
     this.table = new RegionTable(editor, { onRenamed: reload });
     this.history = new History(editor);
     this.old = new OldDemonstrations({ onCarried });
@@ -45,7 +45,7 @@ export class ToolPanel {
 
   content(tab, tool) {
     if (tab === "tools") return this.list;
-    if (tab === "asking") return h("div.scroll", {}, importQuestions(tool, { onChanged: this.onChanged, reload: this.reload }));
+    if (tab === "asking") return h("div.scroll", {}, importQuestions(tool, { onChanged: this.onChanged, reload: this.reload, onLook: this.onLook }));
     if (tab === "importing") return this.importing(tool);
     if (tab === "failed") return this.failed(tool);
     return tab === "history" ? this.history.node : this.regions;

@@ -12,6 +12,7 @@ export class Toolbar {
     this.editor = editor;
     this.buttons = new Map();
     this.node = h("div.edit-bar", { role: "toolbar", "aria-label": "Edit the regions", onkeydown: (event) => this.walk(event) }, this.tools(), this.gap(),
+      this.colours = this.button("colours", "half", "Colours", () => editor.paint()),
       this.undo = this.button("undo", "undo", "Undo", () => editor.undo()), this.redo = this.button("redo", "redo", "Redo", () => editor.redo()));
     this.hint = h("p.edit-hint.plate", { role: "status" });
     this.finish = h("div.finish", { role: "group", "aria-label": "Finish the edit", hidden: true });
@@ -40,7 +41,7 @@ export class Toolbar {
   walk(event) {
     const by = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
     if (!by) return;
-    const all = [...this.buttons.values()];
+    const all = [...this.buttons.values()].filter((node) => !node.hidden);
     all[(all.indexOf(document.activeElement) + by + all.length) % all.length].focus();
     event.preventDefault();
   }
@@ -59,6 +60,7 @@ export class Toolbar {
     bind({ key: "Escape", name: "Leave the mode, then select nothing", when: able(() => editor.leavable), run: inTurn(() => editor.leave()) });
     bind({ key: "z", ctrl: true, shift: false, name: "Undo the last edit", when, run: inTurn(() => editor.undo()) });
     bind({ key: "z", ctrl: true, shift: true, shown: "Ctrl Shift Z", name: "Redo", when, run: inTurn(() => editor.redo()) });
+    bind({ key: "k", shift: true, shown: "Shift K", name: "Colours of the CAD file, or of the regions", when: () => when() && editor.painted, run: inTurn(() => editor.paint()) });
     bind({ key: "a", ctrl: true, name: "Select all regions", when, run: inTurn(() => editor.select(editor.regions.filter((region) => !region.hidden).map((region) => region.id))) });
   }
 
@@ -73,6 +75,9 @@ export class Toolbar {
       node.setAttribute("aria-pressed", String(editor.mode === key));
       node.dataset.tip = [`${MODES[key].name} (${shownKey(key)})`, off ? editor.whyNot : MODES[key].tip].filter(Boolean).join("\n");
     }
+    this.colours.hidden = !editor.painted;
+    this.colours.setAttribute("aria-pressed", String(editor.colours === "cad"));
+    this.colours.dataset.tip = "Show the colours of the CAD file (Shift K)";
     this.drawStep(this.undo, edit?.can_undo, `Undo${edit?.undo ? `: ${edit.undo}` : ""}`, "Ctrl Z", "Nothing to undo");
     this.drawStep(this.redo, edit?.can_redo, `Redo${edit?.redo ? `: ${edit.redo}` : ""}`, "Ctrl Shift Z", "Nothing to redo");
     const hint = editor.possible ? MODES[editor.mode].hint(editor) : editor.whyNot || MODES.select.hint();

@@ -34,7 +34,7 @@ const toolbar = new Toolbar(editor);
 const tools = h("div.tool-list");
 const list = h("div.fill", { style: { flex: "1" } }, h("div.scroll", {}, tools), uploadExtras());
 const column = h("nav.card.fill", { "aria-label": "Tools" });
-const panel = new ToolPanel({ editor, list, onChanged: (tool) => replaceTool(tool).catch(complain), onCut: async (tool) => {
+const panel = new ToolPanel({ editor, list, onChanged: (tool) => replaceTool(tool).catch(complain), onLook: lookAt, onCut: async (tool) => {
   await replaceTool(tool);
   editor.select([]);
 }, onCarried: () => load(), reload: () => load().catch(complain) });
@@ -92,11 +92,29 @@ function asked({ units, up, body } = {}) {
   return `${sentence(words.length > 1 ? `${words.slice(0, -1).join(", ")}, and ${words.at(-1)}` : (words[0] ?? "what is it"))}?`;
 }
 
+const MOST_SHOWN = 300_000; // triangles; the server draws no more of a file that is not read in
+
 const COVERS = {
-  asking: (tool) => [asked(tool.questions ?? {}), `${tool.file_name ?? tool.name} does not say. Answer on the right, then it is cut into regions.`],
+  asking: (tool) => (tool.bodies.reduce((sum, body) => sum + body.faces, 0) > MOST_SHOWN ? [asked(tool.questions ?? {}), askedWords(tool)] : null),
   importing: (tool) => ["Cutting it into regions", tool.job?.message || "This takes a few seconds."],
   failed: () => ["There is nothing to show", "The file could not be used; the reason is on the right."],
 };
+
+const askedWords = (tool) => `${tool.file_name ?? tool.name} does not say. Answer on the right, then it is cut into regions.`;
+
+// The file as it would stand by the answers so far.
+function drawFile(tool) {
+  const { body, up } = tool.questions ?? {};
+  if (state.look?.tool !== tool.id) state.look = { tool: tool.id, body: body?.guess ?? tool.body, up: up?.guess ?? tool.up, highlight: [] };
+  const { tool: id, ...look } = state.look;
+  return state.view.show({ mode: "file", tool_id: id, ...look }, `3D view of the file ${tool.file_name ?? tool.name} with ${look.up} up`);
+}
+
+function lookAt(values) {
+  if (state.tool?.state !== "asking") return;
+  for (const [key, value] of Object.entries(values)) if (value !== null) state.look[key] = value;
+  drawFile(state.tool);
+}
 
 function drawStage() {
   const { tool } = state;
@@ -104,8 +122,9 @@ function drawStage() {
   cover.hidden = !words;
   toolbar.node.hidden = !tool.edit || tool.state !== "ready";
   if (words) fill(cover, h("h2", {}, words[0]), h("p", {}, words[1]));
+  if (tool.state === "asking" && !words) return drawFile(tool);
   if (tool.state !== "ready") return state.view.show({ mode: "empty", tool_id: null }, "No tool is shown");
-  return state.view.show({ mode: tool.edit ? "edit" : "tool", tool_id: tool.id }, `3D view of ${tool.name} with ${plural(tool.region_count, "lettered region")}`);
+  return state.view.show({ mode: tool.edit ? "edit" : "tool", tool_id: tool.id, ...(tool.edit ? { colours: editor.painted ? editor.colours : "regions" } : {}) }, `3D view of ${tool.name} with ${plural(tool.region_count, "lettered region")}`);
 }
 
 function draw() {
@@ -121,6 +140,7 @@ function repaint(what = "") {
   if (!state.tool) return;
   if (what === "hover") return panel.mark();
   toolbar.draw();
+  if (state.tool.state === "asking") toolbar.hint.textContent = `${asked(state.tool.questions)} ${askedWords(state.tool)}`;
   panel.show(state.tool);
   return drawHead();
 }
@@ -182,6 +202,7 @@ async function load(wanted) {
   if (!state.view) {
     state.view = new View3D(stage, { projectId: shell.projectId, name: "tools" });
     editor.attach(state.view);
+    state.view.onPicked((number) => panel.node.querySelector(`.ask-form [name="body"][value="${number + 1}"]`)?.click());
   }
   await open(tool.id);
   return undefined;
