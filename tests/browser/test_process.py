@@ -1,4 +1,4 @@
-"""What counts: a kind of work is chosen, taken back, saved; a feature of one's own is switched on."""
+"""What counts, and what is shown of it: levels are set by handles; a kind of work is chosen, taken back, saved; an own feature."""
 
 from pathlib import Path
 from typing import Any
@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
+from tests.browser.canvas import Studio
 from tests.conftest import Api, LiveServer
 
 pytestmark = pytest.mark.browser
@@ -16,6 +17,35 @@ OWN = """KEY, LABEL = "small_first", "Small regions first"
 def values(graph, done):
     return (1 - graph.area / graph.area.max()) * (1 - done.mean(axis=1, keepdims=True))
 """
+
+
+def test_situations_and_levels(desk: Studio) -> None:
+    """A situation says what to do about it; thresholds are moved, kept and reset."""
+    page, address = desk.page, f"/projects/{desk.project['id']}/coverage"
+
+    def height() -> dict[str, Any]:
+        return next(t for t in desk.api.get(address)["thresholds"] if t["feature"] == "height")
+
+    usual = height()
+    desk.open("coverage")
+    uneven = page.locator('.cell[data-state="thin"]').first
+    uneven.click()
+    expect(page.locator(".situation")).to_contain_text("mostly")
+    expect(page.locator(".situation")).to_contain_text("p = 0.")
+    expect(page.locator(".situation")).to_contain_text("A new tool needs a region")
+
+    page.get_by_text("Where does small end").click()
+    handle = page.get_by_label("Height: large begins at")
+    before = handle.get_attribute("aria-valuetext")
+    handle.focus()
+    handle.press("End")
+    expect(handle).not_to_have_attribute("aria-valuetext", before or "")
+    expect(page.get_by_text("Height is small up to")).to_be_visible()
+    assert (height()["rule"], height()["low"]) == ("expert", pytest.approx(usual["low"], abs=0.01))
+    assert height()["high"] == pytest.approx(usual["most"])
+    page.get_by_role("button", name="Back to the usual levels of height").click()
+    expect(page.get_by_text("Height has its usual levels again.")).to_be_visible()
+    assert height() == usual
 
 
 def test_choosing_what_counts(quiet_page: Page, server: LiveServer, api_of_all: Api, sample: dict[str, Any]) -> None:

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -237,3 +238,21 @@ def test_every_tool_is_ranked_and_spreads_count_all_values(tools):
     values = np.concatenate([sample_transitions(p).values for p in tools])
     assert [sum(s.counts) for s in report.spreads] == [len(values)] * values.shape[1]
     assert [s.least for s in report.spreads] == pytest.approx(values.min(axis=0))
+
+
+def test_table_computed_by_hand():
+    """Three regions in a row, 0, 0.1 and 0.5 high, flat. Done from low to high the steps in height are 0, 0.1 and 0.45: with small up to
+    0.05 and large from 0.35, one step of each level, all with the smallest change of curvature. Nothing else has levels to be even over."""
+    graph = grid_graph(1, 3, 3)
+    graph = replace(graph, height=np.array([0.0, 0.1, 0.5]), curvature=np.zeros(3))
+    problem = problem_for(graph)
+    others = [key for key in factor_groups(problem.features) if key != "height"]
+    rules = LevelRules(expert=(("height", 0.05, 0.35), *((key, 9.0, 9.0) for key in others)))
+    suspected = (Interaction("height", "curvature"),)
+    report = coverage([problem], [(0, (0, 1, 2))], suspected, rules)
+    assert [[c.count for c in row] for row in report.tables[0].cells] == [[1, 0, 0]] * 3
+    assert [[c.state for c in row] for row in report.tables[0].cells] == [["captured", "impossible", "impossible"]] * 3
+    assert (report.rho, report.captured, report.shown, report.possible) == (1.0, 3, 3, 3)
+    high_first = coverage([problem], [(0, (2, 1, 0))], suspected, rules)  # steps 0, 0.4 down, 0.3 down
+    assert [row[0].count for row in high_first.tables[0].cells] == [1, 1, 1]
+    assert [row[0].state for row in coverage([problem], [], suspected, rules).tables[0].cells] == ["missing"] * 3

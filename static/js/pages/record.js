@@ -104,9 +104,10 @@ async function move(from, to) {
 async function save() {
   if (!state.draft?.complete || state.busy) return;
   state.busy = true;
+  const gained = state.draft.coverage_gain;
   try {
     const demonstration = await post(address("/save"), parts.author.name ? { author: parts.author.name } : {});
-    toast(`${demonstration.name} saved`);
+    toast(`${demonstration.name} saved${gained ? `: coverage went from ${gained.before.toFixed(2)} to ${gained.after.toFixed(2)}` : ""}`);
     await Promise.all([loadTools(), reload(), state.saved.load()]);
   } catch (error) {
     complain(error);
