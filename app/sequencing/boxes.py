@@ -13,8 +13,9 @@ from app.geometry.tool import Array
 from app.sequencing.relaxations import cheapest_sets
 from app.sequencing.structure import Declaration, Gap
 
-GROUPS = (26, 18, 11, 8)  # different coordinates per side of the box; more are joined to this many
-MOST_BOXES = 3100  # the first of GROUPS that keeps below this is taken
+GROUPS = (40, 26, 18, 11, 8)  # different coordinates per side of the box; more are joined to this many
+MOST_BOXES = 8000  # the first of GROUPS that keeps below this is taken
+AT_ONCE = 500  # boxes paired with all others at a time
 SAME = 1e-6  # of the tool's extent: coordinates this close are one
 
 
@@ -56,8 +57,7 @@ def boxes_of(columns: tuple[Declaration, ...], w: Array, free: NDArray[np.int64]
     inside, inside_area = (within[w_], areas[w_]) if weights[0] > 0 and (w_ := within[:, past].all(axis=1)).any() else whole
     rest, rest_area = (within[w_], areas[w_]) if weights[1] > 0 and (w_ := within[:, skipped].all(axis=1)).any() else whole
     inside, rest = inside[:, free], rest[:, free]
-    covered = (~inside).astype(np.float32) @ (~rest).astype(np.float32).T == 0
-    first, second = np.nonzero(covered)
+    first, second = _covering(inside, rest)
     fixed = np.where(~inside[first], -1, np.where(~rest[second], 1, 0)).astype(np.int8)
     boxes = _costs(
         fixed, one.area[free], weights, inside_area[first], rest_area[second], float(one.area.sum()), float(one.area[past].sum())
@@ -67,6 +67,13 @@ def boxes_of(columns: tuple[Declaration, ...], w: Array, free: NDArray[np.int64]
     single[np.arange(len(free)), free] = True
     small = _exact(gaps, w, single)
     return Boxes(tuple(gaps), one.area[free].copy(), fixed, boxes, small, np.zeros(len(free), np.int64))
+
+
+def _covering(inside: NDArray[np.bool_], rest: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs of boxes that hold every region between them."""
+    out, beyond = (~inside).astype(np.float32), (~rest).astype(np.float32).T
+    found = [np.nonzero(out[i : i + AT_ONCE] @ beyond == 0) for i in range(0, len(out), AT_ONCE)]
+    return np.concatenate([a + i * AT_ONCE for i, (a, _) in enumerate(found)]), np.concatenate([b for _, b in found])
 
 
 def _costs(fixed: NDArray[np.int8], area: Array, weights: Array, inside: Array, rest: Array, total: float, done: float) -> Array:
