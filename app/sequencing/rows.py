@@ -120,8 +120,11 @@ def _lanes(form: Form, tests: Ints) -> Single:
     lane, passed, touch = np.empty((f, n, 4**u, LANES), np.float32), np.empty((u, LANES), np.int64), form.touch.astype(np.float32)
     for a in range(n):
         for j in range(u):
-            for x in range(LANES):
-                passed[j, x] = first_passed(tests, j, a, x, tests.shape[1])
+            passed[j, 0] = tests.shape[1]
+            for b in range(min(LOW, n)):
+                alone = first_passed(tests, j, a, 1 << b, tests.shape[1])
+                for x in range(1 << b):
+                    passed[j, (1 << b) | x] = min(passed[j, x], alone)
         plain = _sums(form.change[:, a], 0, LOW)
         for i in range(f):
             for k in range(4**u):
@@ -165,8 +168,10 @@ def _counts(form: Form) -> tuple[Ints, Single]:
     ones, share = np.empty(LANES, np.int64), np.empty((n, LANES), np.float32)
     for x in range(LANES):
         ones[x] = count_bits(x)
-        for above in range(n):
-            share[above, x] = 1 / max(form.count + above + ones[x], 1)
+    inverse = np.float32(1) / np.maximum(form.count + np.arange(n + LOW + 1), 1).astype(np.float32)
+    for above in range(n):
+        for x in range(LANES):
+            share[above, x] = inverse[above + ones[x]]
     return ones, share
 
 
