@@ -9,8 +9,8 @@ from app.api.dependencies import Body, Ctx, Json, RegionId, Row, located, tagged
 from app.api.idempotency import ActionRoute, IdempotencyKey
 from app.api.tools import Tool
 from app.geometry.segmentation import MOST_TARGET
+from app.workflow import region_rows, tools
 from app.workflow import segmentations as workflow
-from app.workflow import tools
 
 router = APIRouter(prefix="/tools/{tool_id}", tags=["regions"], route_class=ActionRoute)
 
@@ -81,12 +81,18 @@ class Region(Row):
     centroid_mm: list[float]
     normal: list[float]
     height: float
-    neighbours: list[int]
+    neighbours: Annotated[list[int], Field(description="Regions it shares a border with.")]
+    corner_neighbours: Annotated[list[int], Field(description="Regions it touches in a point only.")]
     perimeter_mm: float | None
     free_border_mm: float | None
+    length_mm: Annotated[float | None, Field(description="Longer side along the surface; cylinders and cones are unrolled.")]
+    width_mm: Annotated[float | None, Field(description="Shorter side along the surface.")]
+    aspect: Annotated[float | None, Field(description="Length over width.")]
+    direction_deg: Annotated[
+        float | None, Field(description="Where the longer side points seen from above, 0 to 180 from x; null for squares and upright ones.")
+    ]
     locked: bool
     hidden: bool
-    colour: Annotated[str | None, Field(description="What most of it is painted in the CAD file, #rrggbb.")]
 
 
 class RegionList(Row):
@@ -94,6 +100,34 @@ class RegionList(Row):
 
     items: list[Region]
     next: None = None
+
+
+class Neighbours(Row):
+    """Two regions that touch."""
+
+    a: int
+    b: int
+    touch: Annotated[
+        Literal["border", "rounding", "corner"],
+        Field(description="border: a shared line; rounding: the faces on both sides of a narrow fillet; corner: a point only."),
+    ]
+    across: Annotated[int | None, Field(description="The rounding between them.")]
+    border_mm: float | None
+    angle_deg: Annotated[
+        float | None, Field(description="What the surface turns by from one to the other: + a ridge, - a valley, 0 level.")
+    ]
+    distance_mm: Annotated[float | None, Field(description="From middle to middle along the surface.")]
+
+
+class NeighbourList(Row):
+    """Pairs of regions that touch, and how far all lie apart."""
+
+    items: list[Neighbours]
+    next: None = None
+    distances_mm: Annotated[
+        list[list[float | None]] | None,
+        Field(description="From each region's middle to each other's along the working surface; null where none leads there."),
+    ]
 
 
 class Step(Row):
@@ -169,6 +203,12 @@ def regions_csv(ctx: Ctx, tool_id: str) -> Response:
     """The regions as a table; units are in its header."""
     headers = {"Content-Disposition": 'attachment; filename="regions.csv"'}
     return Response(workflow.regions_csv(ctx, tool_id), media_type="text/csv; charset=utf-8", headers=headers)
+
+
+@router.get("/neighbours")
+def list_neighbours(ctx: Ctx, tool_id: str) -> NeighbourList:
+    """Which regions touch, how, at which angle, and how far regions lie apart along the surface."""
+    return NeighbourList.model_validate(region_rows.list_neighbours(ctx, tool_id))
 
 
 @router.patch("/regions/{region}", response_model=Region)

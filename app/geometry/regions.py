@@ -10,6 +10,7 @@ from app.geometry.attributes import Attributes, find_attributes, region_boxes
 from app.geometry.borders import corner_neighbours, find_borders, opposite_lengths
 from app.geometry.cleaning import face_pairs
 from app.geometry.descriptions import describe
+from app.geometry.distances import surface_distances
 from app.geometry.fitting import AREA, NORMAL_WEIGHT, add_up, face_sums
 from app.geometry.merging import absorb_small, build_tree
 from app.geometry.splitting import quantiles
@@ -138,3 +139,4 @@ def warm_up() -> None:
     absorb_small(sums, pairs, 0.1, 1, NORMAL_WEIGHT)
     quantiles(vertices[faces][:, :, 0], add_up(sums, np.arange(2))[:, AREA], np.array([0.5]))
     measure(Mesh(vertices, faces.astype(np.int32)), np.zeros(2, np.int32))
+    surface_distances(Mesh(vertices, faces.astype(np.int32)), np.zeros(2, np.int32), vertices[:1])

@@ -9,7 +9,6 @@ import numpy as np
 from sqlmodel import Session, col, func, select
 
 from app.errors import Conflict, InvalidInput, StaleVersion
-from app.geometry.borders import FREE, find_borders
 from app.geometry.importing import ImportedPart
 from app.geometry.merge_tree import MergeTree
 from app.geometry.recutting import recut
@@ -24,6 +23,7 @@ from app.workflow.context import Context
 from app.workflow.editing_views import follow_edit, follow_jump
 from app.workflow.edits import SAME_REGIONS, After, Before, apply
 from app.workflow.lookup import found, present, ready_segmentation, refuse_training_on
+from app.workflow.region_rows import MEASURED, measured, neighbour_angles
 from app.workflow.tool_rows import add_cut, tool_json, touch_tool
 from app.workflow.tools import region_json
 
@@ -31,7 +31,8 @@ Json = dict[str, Any]
 
 CSV_COLUMNS = (
     "id", "name", "description", "kind", "area_mm2", "curvature_per_m", "height", "centroid_x_mm", "centroid_y_mm", "centroid_z_mm",
-    "normal_x", "normal_y", "normal_z", "perimeter_mm", "free_border_mm", "neighbours", "locked", "hidden",
+    "normal_x", "normal_y", "normal_z", "perimeter_mm", "free_border_mm", "length_mm", "width_mm", "aspect", "direction_deg",
+    "neighbours", "neighbour_angles_deg", "corner_neighbours", "locked", "hidden",
 )  # fmt: skip
 
 
@@ -199,22 +200,19 @@ def history(ctx: Context, tool_id: str) -> Json:
 def list_regions(ctx: Context, tool_id: str) -> list[Json]:
     """The regions with their attributes and marks; the position is the region id."""
 
-    def query(session: Session) -> tuple[Tool, Segmentation, str | None]:
-        row = present(session, ToolRow, tool_id)
-        cut = ready_segmentation(session, row)
-        return ctx.values.tool(session, cut), cut, row.part_sha
+    def query(session: Session) -> tuple[Tool, Segmentation]:
+        cut = ready_segmentation(session, present(session, ToolRow, tool_id))
+        return ctx.values.tool(session, cut), cut
 
-    tool, cut, part_sha = ctx.store.read(query)
-    colours = ctx.values.colours(tool, cut.tool_sha, part_sha)
-    perimeter, free = _borders(tool)
+    tool, cut = ctx.store.read(query)
+    shapes = measured(ctx.values, tool, cut.tool_sha)
     return [
         {
             **region_json(tool, a),
-            "perimeter_mm": perimeter[a],
-            "free_border_mm": free[a],
+            **shapes[a],
+            "corner_neighbours": [int(b) for b in np.flatnonzero(tool.graph.corner[a])],
             "locked": a in cut.locked,
             "hidden": a in cut.hidden,
-            "colour": None if (painted := colours[a]) is None else "#{:02x}{:02x}{:02x}".format(*painted),
         }
         for a in range(tool.n)
     ]
@@ -223,32 +221,26 @@ def list_regions(ctx: Context, tool_id: str) -> list[Json]:
 def regions_csv(ctx: Context, tool_id: str) -> str:
     """The regions as a table with units in its header."""
     rows = list_regions(ctx, tool_id)
+    angles = neighbour_angles(ctx, tool_id)
     names = [row["name"] for row in rows]
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\r\n")
     writer.writerow(CSV_COLUMNS)
     for row in rows:
         shape = [f"{v:.6g}" for v in (row["area_mm2"], row["curvature_per_m"], row["height"], *row["centroid_mm"], *row["normal"])]
-        border = ["" if v is None else f"{v:.6g}" for v in (row["perimeter_mm"], row["free_border_mm"])]
+        border = ["" if (v := row[key]) is None else f"{v:.6g}" for key in MEASURED]
         words = [_harmless(row[key]) for key in ("name", "description", "kind")]
-        beside = " ".join(_harmless(names[b]) for b in row["neighbours"])
-        writer.writerow([row["id"], *words, *shape, *border, beside, str(row["locked"]).lower(), str(row["hidden"]).lower()])
+        beside, corners = (" ".join(_harmless(names[b]) for b in row[key]) for key in ("neighbours", "corner_neighbours"))
+        turns = " ".join("-" if (angle := angles.get((row["id"], b))) is None else f"{angle:.4g}" for b in row["neighbours"])
+        writer.writerow(
+            [row["id"], *words, *shape, *border, beside, turns, corners, str(row["locked"]).lower(), str(row["hidden"]).lower()]
+        )
     return file.getvalue()
 
 
 def _harmless(text: str) -> str:
     """A spreadsheet must not take a name for a formula."""
     return f"'{text}" if text[:1] in ("=", "+", "-", "@") else text
-
-
-def _borders(tool: Tool) -> tuple[list[float | None], list[float | None]]:
-    """Whole and free border of each region, mm; None for tools from a table, whose lengths are in the table's own units."""
-    if tool.graph.source != "mesh":
-        return [None] * tool.n, [None] * tool.n
-    borders = find_borders(tool.mesh, tool.labels)
-    free = borders.beyond == FREE
-    open_length = np.bincount(borders.region[free], weights=borders.length[free], minlength=tool.n)
-    return (borders.perimeter(tool.n) * 1e3).tolist(), (open_length * 1e3).tolist()
 
 
 def _before(ctx: Context, session: Session, tool_id: str, kind: str, segmentation_id: str | None) -> tuple[str, Before]:

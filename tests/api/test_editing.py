@@ -2,6 +2,7 @@
 
 import csv
 import io
+import math
 from typing import Any
 
 import pytest
@@ -271,16 +272,6 @@ def test_one_drag_of_the_slider_is_one_step(api: Api) -> None:
     assert api.post(f"{path}/undo", status=200)["region_count"] == 9
 
 
-def test_colours_of_the_file_stay_while_the_tool_does(api: Api, tool: dict[str, Any]) -> None:
-    assert {region["colour"] for region in regions(api, tool)} == {None}, "a sample has no CAD file"
-    view = api.post("/sessions", {"project_id": tool["project_id"]})
-    scene = {"mode": "edit", "tool_id": tool["id"]}
-    shown = api.call("PUT", f"/sessions/{view['id']}/scene", 200, json={**scene, "colours": "cad"})
-    assert shown["scene"]["colours"] == "cad"
-    assert api.call("PUT", f"/sessions/{view['id']}/scene", 200, json={**scene, "dark": True})["scene"]["colours"] == "cad"
-    api.call("PUT", f"/sessions/{view['id']}/scene", 422, json={**scene, "colours": "red"})
-
-
 def test_table_of_regions(api: Api, tool: dict[str, Any]) -> None:
     api.call("PATCH", f"/tools/{tool['id']}/regions/0", 200, json={"name": "=1+1"})
     response = api.client.get(f"/api/v1/tools/{tool['id']}/regions.csv")
@@ -293,7 +284,22 @@ def test_table_of_regions(api: Api, tool: dict[str, Any]) -> None:
         assert float(row["area_mm2"]) == pytest.approx(region["area_mm2"], rel=1e-5)
         assert float(row["perimeter_mm"]) == pytest.approx(region["perimeter_mm"], rel=1e-5)
         assert 0 <= float(row["free_border_mm"]) <= float(row["perimeter_mm"]) * (1 + 1e-5)
+        assert float(row["length_mm"]) / float(row["width_mm"]) == pytest.approx(region["aspect"], rel=1e-4)
+        assert len(row["neighbour_angles_deg"].split()) == len(region["neighbours"])
     assert sum(float(row["free_border_mm"]) for row in rows) > 0
+
+
+def test_how_regions_lie_to_each_other(api: Api, tool: dict[str, Any]) -> None:
+    """Both lists of neighbours agree; ways along the surface are at least straight lines, the same both ways."""
+    known, near = regions(api, tool), api.get(f"/tools/{tool['id']}/neighbours")
+    for touch, key in (("border", "neighbours"), ("corner", "corner_neighbours")):
+        pairs = {(p["a"], p["b"]) for p in near["items"] if p["touch"] == touch}
+        assert pairs == {(r["id"], b) for r in known for b in r[key] if r["id"] < b}
+    assert all((p["angle_deg"] is None) == (p["touch"] == "corner") for p in near["items"])
+    for p in near["items"]:
+        straight = math.dist(known[p["a"]]["centroid_mm"], known[p["b"]]["centroid_mm"])
+        assert p["distance_mm"] == near["distances_mm"][p["b"]][p["a"]]
+        assert p["distance_mm"] > 0.9 * straight  # centroids of bent regions lie beside the surface
 
 
 def test_undo_survives_a_restart(settings: Settings, tmp_path: Any) -> None:

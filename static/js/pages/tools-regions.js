@@ -1,11 +1,11 @@
 // The table of regions beside the 3D view: sortable, hover and selection both ways, names changed in place, all numbers with units.
 
-import { patch } from "../api.js";
+import { get, patch } from "../api.js";
 import { fill, h } from "../dom.js";
 import { icon } from "../icons.js";
 import { tint } from "../ramp.js";
 import { renameable } from "../rename.js";
-import { fixed, number, plural } from "../words.js";
+import { fixed, number, plural, sentence } from "../words.js";
 import { regionNames } from "./tools-modes.js";
 
 const by = (read) => (a, b) => read(a) - read(b);
@@ -13,11 +13,24 @@ const COLUMNS = [
   { key: "name", words: "Region", order: (a, b) => a.name.localeCompare(b.name, "en", { numeric: true }) },
   { key: "description", words: "Where", order: (a, b) => a.description.localeCompare(b.description) },
   { key: "area", words: "cm\u00b2", tip: "Surface area in square centimetres", order: by((region) => region.area_mm2), text: (region) => fixed(region.area_mm2 / 100) },
+  { key: "size", words: "Size", wide: true, tip: "Length by width along its surface in centimetres; cylinders and cones are measured unrolled, others as seen straight on", order: by((region) => region.length_mm ?? 0), text: (region) => (region.length_mm ? `${fixed(region.length_mm / 10)} \u00d7 ${fixed(region.width_mm / 10)}` : "-") },
+  { key: "aspect", words: "Aspect", wide: true, tip: "Length over width along its surface: 1 is as long as wide", order: by((region) => region.aspect ?? 0), text: (region) => fixed(region.aspect ?? NaN) },
   { key: "height", words: "Height", tip: "Highest point: 0 is the lowest of the working surface, 1 the highest", order: by((region) => region.height), text: (region) => fixed(region.height, 2) },
   { key: "curvature", words: "1/m", tip: "Strongest curvature, one over the radius in metres; positive is convex", order: by((region) => region.curvature_per_m), text: (region) => fixed(region.curvature_per_m) },
   { key: "border", words: "Border", wide: true, tip: "Length of its border in centimetres", order: by((region) => region.perimeter_mm ?? 0), text: (region) => fixed((region.perimeter_mm ?? NaN) / 10) },
   { key: "free", words: "Free", wide: true, tip: "Part of its border that touches no other region, in centimetres", order: by((region) => region.free_border_mm ?? 0), text: (region) => fixed((region.free_border_mm ?? NaN) / 10) },
 ];
+
+const KINDS = {
+  plane: "Flat",
+  cylinder: "Bent one way with one radius, like a pipe",
+  cone: "Bent one way with a radius that grows evenly, like a funnel",
+  sphere: "Bent all ways with one radius, like a ball",
+  curved: "Bent evenly both ways, like a saddle or an egg",
+  freeform: "Bent in no simple way",
+  listed: "As the region table lists it",
+};
+const fold = (degrees) => (Math.abs(degrees) < 1 ? "smooth" : `${number(Math.abs(degrees), 2)}\u00b0 ${degrees > 0 ? "ridge" : "valley"}`);
 
 // The whole text on hover, but only where the column cuts it.
 function tipWhenCut({ currentTarget: cell }) {
@@ -37,6 +50,7 @@ export class RegionTable {
     this.facts = h("div.region-facts");
     this.node = h("div.fill", { style: { flex: "1" } }, this.scroll, this.facts);
     this.shown = "";
+    this.near = { of: "", list: null };
     this.rows = new Map();
     this.focused = 0;
   }
@@ -149,11 +163,12 @@ export class RegionTable {
   drawFacts() {
     const { selection, regions } = this.editor;
     const one = selection.length === 1 ? regions[selection[0]] : null;
+    if (one || selection.length === 2) this.askNear();
     const chosen = selection.length ? selection.map((id) => regions[id]) : regions;
     const area = `${number(chosen.reduce((sum, region) => sum + region.area_mm2, 0) / 100)} cm\u00b2`;
     const hidden = regions.filter((region) => region.hidden).map((region) => region.id);
     this.facts.classList.toggle("beside", hidden.length > 0);
-    fill(this.facts, one ? this.factsOf(one) : h("p", {}, selection.length ? `${regionNames(this.editor, selection)}: ` : `${plural(regions.length, "region")}, `, h("b", {}, area), selection.length ? "" : " of working surface"),
+    fill(this.facts, one ? this.factsOf(one) : h("p", {}, selection.length ? `${regionNames(this.editor, selection)}: ` : `${plural(regions.length, "region")}, `, h("b", {}, area), selection.length ? "" : " of working surface"), selection.length === 2 ? this.factsOfPair(selection) : null,
       hidden.length ? h("button.btn.quiet.small", { type: "button", dataset: { key: "show-all" }, onclick: () => this.editor.inTurn(() => this.editor.edit({ kind: "hide", regions: hidden, on: false }, "Show all")) }, icon("eye"), `Show ${plural(hidden.length, "hidden region")}`) : null);
   }
 
@@ -161,9 +176,40 @@ export class RegionTable {
     const tilt = (Math.acos(Math.max(-1, Math.min(1, region.normal[2]))) * 180) / Math.PI;
     const round = ["cylinder", "sphere"].includes(region.kind) && Math.abs(region.curvature_per_m) > 1e-3;
     const shape = `${region.kind}${round ? `, radius ${number(1000 / Math.abs(region.curvature_per_m))} mm` : ""}, tilted ${number(tilt, 2)}\u00b0`;
-    const border = region.perimeter_mm === undefined ? "" : `Border ${number(region.perimeter_mm / 10)} cm, ${number(region.free_border_mm / 10)} cm free; `;
-    const touches = region.neighbours.length ? `touches ${regionNames(this.editor, region.neighbours)}` : "touches no other region";
+    const border = region.perimeter_mm === null ? "" : `Border ${number(region.perimeter_mm / 10)} cm, ${number(region.free_border_mm / 10)} cm free; `;
+    const touches = region.neighbours.length ? `touches ${this.beside(region)}` : "touches no other region";
     const middle = `Middle at ${region.centroid_mm.map((x) => number(x)).join(", ")} mm`;
-    return [h("p", { dataset: { tip: middle } }, h("b", {}, region.name), ` ${shape}`), h("p", { onpointerenter: tipWhenCut }, border ? border + touches : touches)];
+    return [h("p", { dataset: { tip: `${KINDS[region.kind]}. ${middle}` } }, h("b", {}, region.name), ` ${shape}`), h("p", { onpointerenter: tipWhenCut }, border ? border + touches : touches)];
+  }
+
+  // Its neighbours, with the angle to each once that is known.
+  beside(region) {
+    const turns = new Map((this.near.list?.items ?? []).filter((pair) => pair.touch === "border" && pair.angle_deg !== null)
+      .flatMap(({ a, b, angle_deg: angle }) => [[`${a}-${b}`, angle], [`${b}-${a}`, angle]]));
+    if (!turns.size) return regionNames(this.editor, region.neighbours);
+    return region.neighbours.map((b) => `${regionNames(this.editor, [b])} (${fold(turns.get(`${region.id}-${b}`) ?? 0)})`).join(", ");
+  }
+
+  factsOfPair(selection) {
+    const { list } = this.near;
+    if (!list) return null;
+    const [a, b] = [...selection].sort((x, y) => x - y);
+    const pair = list.items.find((each) => each.a === a && each.b === b);
+    const length = pair?.border_mm ? ` over ${number(pair.border_mm / 10)} cm` : "";
+    const touch = !pair ? "Don't touch" : pair.touch === "corner" ? "Touch in a corner" : `${sentence(pair.angle_deg === null ? "neighbours" : fold(pair.angle_deg))}${length}${pair.touch === "rounding" ? `, across ${regionNames(this.editor, [pair.across])}` : ""}`;
+    const way = list.distances_mm?.[a][b];
+    return h("p", { dataset: { tip: "How the surface turns where they meet, and the shortest way over it from middle to middle" } }, way ? `${touch}; ${number(way / 10)} cm apart` : touch);
+  }
+
+  // How regions lie to each other is asked for once per cut, when somebody looks at one or two.
+  askNear() {
+    const { tool } = this.editor;
+    if (this.near.of === tool.segmentation_id) return;
+    const near = { of: tool.segmentation_id, list: null };
+    this.near = near;
+    get(`/tools/${encodeURIComponent(tool.id)}/neighbours`).then((list) => {
+      near.list = list;
+      if (this.near === near) this.drawFacts();
+    }, () => { near.list = null; }); // the rest of the facts stands without
   }
 }
