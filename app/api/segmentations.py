@@ -93,6 +93,7 @@ class Region(Row):
     ]
     locked: bool
     hidden: bool
+    colour: Annotated[str | None, Field(description="What most of it is painted in the CAD file, #rrggbb.")]
 
 
 class RegionList(Row):

@@ -200,11 +200,13 @@ def history(ctx: Context, tool_id: str) -> Json:
 def list_regions(ctx: Context, tool_id: str) -> list[Json]:
     """The regions with their attributes and marks; the position is the region id."""
 
-    def query(session: Session) -> tuple[Tool, Segmentation]:
-        cut = ready_segmentation(session, present(session, ToolRow, tool_id))
-        return ctx.values.tool(session, cut), cut
+    def query(session: Session) -> tuple[Tool, Segmentation, str | None]:
+        row = present(session, ToolRow, tool_id)
+        cut = ready_segmentation(session, row)
+        return ctx.values.tool(session, cut), cut, row.part_sha
 
-    tool, cut = ctx.store.read(query)
+    tool, cut, part_sha = ctx.store.read(query)
+    colours = ctx.values.colours(tool, cut.tool_sha, part_sha)
     shapes = measured(ctx.values, tool, cut.tool_sha)
     return [
         {
@@ -213,6 +215,7 @@ def list_regions(ctx: Context, tool_id: str) -> list[Json]:
             "corner_neighbours": [int(b) for b in np.flatnonzero(tool.graph.corner[a])],
             "locked": a in cut.locked,
             "hidden": a in cut.hidden,
+            "colour": None if (painted := colours[a]) is None else "#{:02x}{:02x}{:02x}".format(*painted),
         }
         for a in range(tool.n)
     ]

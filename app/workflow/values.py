@@ -8,9 +8,11 @@ from typing import Any
 
 from sqlmodel import Session, col, select
 
+from app.geometry.cad_faces import Colour
 from app.geometry.carry_over import RegionMap, map_regions
 from app.geometry.importing import ImportedPart
 from app.geometry.merge_tree import Integers, MergeTree
+from app.geometry.painted import region_colours
 from app.geometry.pieces import tree_for
 from app.geometry.segmentation import Patches, SegmentationParameters, find_patches, part_tree
 from app.geometry.tool import Tool
@@ -67,6 +69,7 @@ class Values:
         self._parts = Kept(KEPT_TREES)
         self._patches = Kept(KEPT_TREES)
         self._maps = Kept(KEPT_MAPS)
+        self._colours = Kept(KEPT_MAPS)
 
     def tool(self, session: Session, segmentation: Segmentation) -> Tool:
         """The tool with the names people gave its regions."""
@@ -123,6 +126,11 @@ class Values:
     def part(self, part_sha: str | None) -> ImportedPart | None:
         """A cleaned part."""
         return None if part_sha is None else self._parts.get(part_sha, lambda: part_from_bytes(self._store.artifacts.get(part_sha)))
+
+    def colours(self, tool: Tool, tool_sha: str, part_sha: str | None) -> tuple[Colour | None, ...]:
+        """The colours the CAD file gives the regions; None each for tools without such a file."""
+        part = self.part(part_sha)
+        return (None,) * tool.n if part is None else self._colours.get((tool_sha, part_sha), lambda: region_colours(tool, part))
 
     def region_map(self, session: Session, old: Segmentation, new: Segmentation) -> RegionMap:
         """How the regions of an older cut lie in a newer one."""

@@ -272,6 +272,16 @@ def test_one_drag_of_the_slider_is_one_step(api: Api) -> None:
     assert api.post(f"{path}/undo", status=200)["region_count"] == 9
 
 
+def test_colours_of_the_file_stay_while_the_tool_does(api: Api, tool: dict[str, Any]) -> None:
+    assert {region["colour"] for region in regions(api, tool)} == {None}, "a sample has no CAD file"
+    view = api.post("/sessions", {"project_id": tool["project_id"]})
+    scene = {"mode": "edit", "tool_id": tool["id"]}
+    shown = api.call("PUT", f"/sessions/{view['id']}/scene", 200, json={**scene, "colours": "cad"})
+    assert shown["scene"]["colours"] == "cad"
+    assert api.call("PUT", f"/sessions/{view['id']}/scene", 200, json={**scene, "dark": True})["scene"]["colours"] == "cad"
+    api.call("PUT", f"/sessions/{view['id']}/scene", 422, json={**scene, "colours": "red"})
+
+
 def test_table_of_regions(api: Api, tool: dict[str, Any]) -> None:
     api.call("PATCH", f"/tools/{tool['id']}/regions/0", 200, json={"name": "=1+1"})
     response = api.client.get(f"/api/v1/tools/{tool['id']}/regions.csv")
