@@ -17,7 +17,7 @@ export function verdict({ certificate }) {
   if (!certificate) return { mark: "half", tone: "warn", title: "Learned as in the paper", text: "Step by step until nothing changed. That proves nothing about other orders." };
   const conflicts = certificate.conflicts?.length ?? 0;
   if (certificate.kind === "likelihood") {
-    const why = conflicts ? `${plural(conflicts, "set")} of your orders contradict${conflicts === 1 ? "s" : ""} each other, so exceptions are allowed for.` : "Exceptions are allowed for: that predicts your orders better than weights that explain each exactly.";
+    const why = conflicts ? "No weights explain all of them, so exceptions are allowed for." : "Exceptions are allowed for: that predicts your orders better than weights that explain each exactly.";
     return { mark: "half", tone: "warn", title: `Predicts ${certificate.held_out_hits} of your ${plural(certificate.of, "order")}`, text: `Each was left out of learning in turn. ${why}` };
   }
   if (!certificate.realisable) return { mark: "warn", tone: "bad", title: "Not every recorded order is a cheapest one", text: "No weights explain all of them; these come nearest." };
@@ -70,8 +70,8 @@ export class Certificate {
 
   conflicts(sets) {
     if (!sets.length) return null;
-    return h("section", {}, h("h3", {}, "Orders that exclude each other"), h("p.small.muted", {}, "Without any one of a set the rest of it fits. In brackets, how much dearer that order is when the others are explained. Click one to see why."),
-      sets.map((set) => h("div.conflict", {}, h("div.conflict-tools", {}, set.tools.map((entry) => this.picture(entry))), h("p.small", {}, set.resolved || "Nothing that was tried resolves it: record one of them again, or leave it out."))));
+    return h("section", {}, h("h3", {}, "Orders that no rule explains together"), h("p.small.muted", {}, "Without any one of a set the rest of it fits. In brackets, how much dearer that order is when the others are explained. Click one to see why."),
+      sets.map((set) => h("div.conflict", {}, h("div.conflict-tools", {}, set.tools.map((entry) => this.picture(entry))), h("p.small", {}, set.tools.length === 1 ? "No weights make this order a cheapest one, not even alone. " : "", set.resolved || `Nothing that was tried resolves it: record ${set.tools.length === 1 ? "it" : "one of them"} again, or leave it out.`))));
   }
 
   picture(entry) {
