@@ -154,17 +154,19 @@ def test_teaching_to_the_robot(api: Api, sample: dict[str, Any]) -> None:
 
 
 def test_undo_of_an_answer_asks_again(api: Api, sample: dict[str, Any]) -> None:
-    run = api.post(f"/projects/{sample['id']}/runs", {"kind": "performance", "mode": "paper", "seed": 7}, status=202)
-    run = api.until(f"/runs/{run['id']}", lambda row: row["state"] in SETTLED)
+    """In the default mode, two questions at a time."""
+    asked = {"kind": "performance", "seed": 7, "params": {"tolerance": 0.0001, "batch": 2}}
+    run = api.post(f"/projects/{sample['id']}/runs", asked, status=202)
+    run = api.until(f"/runs/{run['id']}", lambda row: row["state"] in SETTLED, seconds=120)
     queries = api.get(f"/projects/{sample['id']}/queries", params={"state": "open"})["items"]
     assert len(queries) == run["open_queries"] >= 1
     query = queries[0]
-    assert [c["value"] for c in query["choices"]] == ["similar", "not_similar", "cant_tell"]
+    assert [c["value"] for c in query["choices"]] == ["left", "right", "equal", "both_wrong", "cant_tell"]
     assert sorted(query["left"]["sequence"]) == sorted(query["right"]["sequence"])
     if len(queries) > 1:
-        answer = api.post(f"/queries/{query['id']}/answer", {"value": "similar"})
+        answer = api.post(f"/queries/{query['id']}/answer", {"value": "left"})
         assert answer["run_state"] == "waiting_for_expert"
-        assert api.get(f"/queries/{query['id']}")["answer"]["value"] == "similar"
+        assert api.get(f"/queries/{query['id']}")["answer"]["value"] == "left"
         reopened = api.post(f"/answers/{answer['id']}/undo", status=200)
         assert (reopened["state"], reopened["answer"]) == ("open", None)
 
