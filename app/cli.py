@@ -131,10 +131,15 @@ def bench(
     name: Annotated[Literal["sequencing", "learning", "geometry"], typer.Argument(help="What to measure.")],
     data: Annotated[Path | None, typer.Option(exists=True, file_okay=False, help="Folder with the authors' tables.")] = None,
     cad: Annotated[Path | None, typer.Option(exists=True, file_okay=False, help="Folder with CAD files.")] = None,
-    checkout: Annotated[Path | None, typer.Option(exists=True, file_okay=False, help="Checkout of the authors' code, for ratios.")] = None,
+    checkout: Annotated[
+        Path | None,
+        typer.Option("--authors", "--checkout", exists=True, file_okay=False, help="Checkout of the authors' code, for ratios."),
+    ] = None,
     out: Annotated[Path | None, typer.Option(file_okay=False, help="Folder for pictures and tables.")] = None,
     json_file: Annotated[Path | None, typer.Option("--json", help="Also write the figures to this file.")] = None,
     quick: Annotated[bool, typer.Option(help="Smaller doses; bars may be missed.")] = False,
+    reference_command: Annotated[str | None, typer.Option(help="Solves one tool in that checkout (docs/sequencing.md).")] = None,
+    reference_tool: Annotated[str | None, typer.Option(help="Which of the tables in --data it solves: real/8, synthetic/9.")] = None,
 ) -> None:
     """Measure and print each figure beside its bar; status 1 when a bar is missed."""
     from importlib import import_module
@@ -144,7 +149,9 @@ def bench(
     seen: list[Figure] = []
 
     def kept() -> Iterator[Figure]:
-        for figure in import_module(f"app.benches.{name}").measure(Options(data, cad, checkout, out, quick)):
+        for figure in import_module(f"app.benches.{name}").measure(
+            Options(data, cad, checkout, out, quick, reference_command, reference_tool)
+        ):
             seen.append(figure)
             yield figure
 

@@ -15,6 +15,8 @@ class Options:
     checkout: Path | None = None  # a checkout of the authors' published code, for ratios against it
     out: Path | None = None  # folder for pictures and tables
     quick: bool = False  # smaller doses, for tests
+    reference_command: str | None = None  # what solves one tool in the checkout
+    reference_tool: str | None = None  # "real/8": which of the authors' tables that is
 
 
 @dataclass(frozen=True)

@@ -1,27 +1,35 @@
 """`apprentice bench sequencing`: seconds and memory of the exact search, equality of its paths, and ratios to other methods."""
 
 import itertools
+import os
+import shlex
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from importlib.util import find_spec
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import networkx as nx
 import numpy as np
 
 from app.benches.figures import Figure, Options
 from app.geometry.tool import Array, RegionGraph
+from app.learning.evaluation import read_tables
 from app.sequencing import kernels
-from app.sequencing.classes import best_classes
+from app.sequencing.classes import best_classes, equivalent_sequences, omega_size
 from app.sequencing.constraints import resolve
-from app.sequencing.exact import THREADS_FROM, bytes_needed, costs_to_go, form_for, model_for, parallel_is_safe
-from app.sequencing.problem import SequencingProblem, problem_for
+from app.sequencing.exact import bytes_needed, costs_to_go, form_for, model_for, uses_threads
+from app.sequencing.last import regripping, travel
+from app.sequencing.problem import TENSOR_LIMIT, SequencingProblem, problem_for
 from app.sequencing.shortest import shortest_sequence
 
-SHAPES = {7: (1, 7), 8: (2, 4), 9: (3, 3), 12: (3, 4), 16: (4, 4), 20: (4, 5), 24: (4, 6), 26: (2, 13), 28: (4, 7)}
+SHAPES = {7: (1, 7), 8: (2, 4), 9: (3, 3), 10: (2, 5), 12: (3, 4), 16: (4, 4), 18: (3, 6), 20: (4, 5), 24: (4, 6), 26: (2, 13), 28: (4, 7)}
 BARS_MS = {12: 0.1, 20: 8.0, 24: 300.0, 26: 1500.0}
 MOST_BYTES = 2.5e9  # at N = 28
+ADAPTER = "apprentice_adapter.py"
 PUBLISHED_S = {9: 0.72, 10: 3.7}  # the authors' Dijkstra, best of contended runs on another day: the study of sequencing, 2.1
 
 
@@ -31,9 +39,11 @@ def measure(options: Options) -> Iterator[Figure]:
     for n in sizes:
         yield from _solves(n, (), "separable", bars=True)
         yield from _solves(n, None, "with two interactions", bars=False)
+    yield from _by_last((10,) if options.quick else (12, 18, 20))
+    yield from _omega((12,) if options.quick else (12, 16, 20))
     yield from _memory(options.quick)
     yield from _agreement(options.quick)
-    yield from _first_call()
+    yield from _first_call(options.quick)
     yield from _ratios(options)
     yield from _solver()
     if find_spec("app.benches.large"):
@@ -72,28 +82,69 @@ def _best(call: Callable[[], object], seconds: float) -> tuple[float, float]:
 
 
 def _solves(n: int, interactions: tuple[()] | None, words: str, bars: bool) -> Iterator[Figure]:
-    """One solve: costs-to-go under new weights, and the whole answer; both by the wall clock on the threads the product uses."""
+    """One solve under new weights, tables ready, by the wall clock on the threads the product uses: the part that is the dynamic
+    program, and the whole answer."""
     problem, w = made_up(n, interactions)
     started = time.process_time()
     model = model_for(problem, resolve(None, n))
+    if n <= TENSOR_LIMIT:
+        problem.tensor()  # the learner has it at these sizes: the cost in double precision is read from it
     prepared = 1e3 * (time.process_time() - started)
-    costs_to_go(model, form_for(model, w))  # threads started, buffers touched
+    shortest_sequence(problem, w)  # threads started, buffers touched
     group, bar = f"exact, {words}", BARS_MS.get(n) if bars else None
     one_wall, one = _best(lambda: costs_to_go(model, form_for(model, w), threads=False), 0.5)
-    two = n >= THREADS_FROM and parallel_is_safe()
+    two = uses_threads(n)
     wall = _best(lambda: costs_to_go(model, form_for(model, w)), 0.5)[0] if two else one_wall
     threads = "two threads" if two else "one thread, as the product does at this size"
+    whole, cpu = _best(lambda: shortest_sequence(problem, w), 1.0)
+    note = f"wall, {threads}; tables ready; {cpu:.3g} ms cpu of all threads"
+    yield Figure(group, f"N = {n}, one solve: sequence, ties, float64 cost", whole, "ms", bar, note=note)
     note = f"wall, {threads}; one thread: {one:.3g} ms cpu, {one_wall:.3g} ms wall"
-    yield Figure(group, f"N = {n}, costs-to-go, new weights", wall, "ms", bar, note=note)
-    whole, cpu = _best(lambda: shortest_sequence(problem, w), 0.5)
-    note = f"wall, {threads}; {cpu:.3g} ms cpu of all threads"
-    yield Figure(group, f"N = {n}, with sequence, ties and float64 cost", whole, "ms", bar, note=note)
+    yield Figure(group, f"N = {n}, of which costs-to-go (also on their own)", wall, "ms", note=note)
     if two:
         yield Figure(group, f"N = {n}, speed-up of 2 threads", one_wall / wall, "x", note="wall against wall; a busy machine lowers it")
     yield Figure(group, f"N = {n}, tables of the tool, once (cpu)", prepared, "ms")
     if n == 20 and not bars:
         _, classes = _best(lambda: best_classes(problem, w, 10), 0.5)
         yield Figure(group, "N = 20, ten best cost classes, counted (cpu)", classes, "ms")
+
+
+def _by_last(sizes: tuple[int, ...]) -> Iterator[Figure]:
+    """Travel and grip changes: a state is a set and its last region."""
+    for n in sizes:
+        problem, w = made_up(n, ())
+        rng = np.random.default_rng(n)
+        extra = (travel(rng.random((problem.n, 3))), regripping(rng.integers(0, 3, problem.n)))
+        problem, weights = replace(problem, last=extra), np.concatenate([w, [1.0, 0.5]])
+        started, wall = time.process_time(), time.perf_counter()
+        found = shortest_sequence(problem, weights)
+        cpu, wall = time.process_time() - started, time.perf_counter() - wall
+        note = f"one thread, {wall:.3g} s wall; one run, tables of the tool included; {'proved' if found.proved else 'NOT proved'}"
+        yield Figure("costs of the region before", f"N = {problem.n}, one solve over (set, last region), cpu", cpu, "s", note=note)
+
+
+def _omega(sizes: tuple[int, ...]) -> Iterator[Figure]:
+    """Equal feature sums on a tool that mirrors itself, counted and sampled."""
+    for n in sizes:
+        problem = even(n)
+        order = shortest_sequence(problem, np.ones(len(problem.columns))).sequence
+        omega_size(problem, order)
+        _, cpu = _best(lambda p=problem, o=order: equivalent_sequences(p, o), 0.0)
+        found = equivalent_sequences(problem, order)
+        how = "exact" if found.counted else "at least"
+        note = f"{how} {found.count:,} sequences; {len(found.sequences)} listed" + ("" if found.complete else ", as diverse as possible")
+        yield Figure("omega", f"N = {n}, equal feature sums counted and listed, cpu", cpu, "ms", note=note)
+
+
+def even(n: int) -> SequencingProblem:
+    """A grid of equal squares: it mirrors itself."""
+    columns = SHAPES[n][1]
+    row, column = np.divmod(np.arange(n), columns)
+    down, across = abs(row[:, None] - row), abs(column[:, None] - column)
+    edge, corner, low = down + across == 1, (down == 1) & (across == 1), np.stack([column, row], axis=1).astype(float)
+    none, level = np.zeros((n, n)), np.ones(n)
+    graph = RegionGraph("mesh", edge / 4, none, none, edge, corner, edge.argmax(axis=1), 0 * level, level, level / n, low, low + 1)
+    return problem_for(graph, ())
 
 
 LARGEST = """
@@ -109,17 +160,19 @@ print(begun, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 
 
 def _memory(quick: bool) -> Iterator[Figure]:
-    """Tables as computed at N = 28; a process of its own that solves N = 26, as the system counts it."""
+    """A process of its own that solves one tool, as the system counts it."""
     problem, _ = made_up(28)
-    note = "computed from the arrays allocated; not run here"
-    yield Figure("memory", "N = 28, all tables", bytes_needed(problem, 28) / 1e9, "GB", MOST_BYTES / 1e9, note=note)
+    bar, computed = MOST_BYTES / 1e9, bytes_needed(problem, 28) / 1e9
     if quick:
+        note = "computed from the arrays allocated; measured by the full bench"
+        yield Figure("memory", "N = 28, all tables", computed, "GB", bar, note=note)
         return
-    out = subprocess.run([sys.executable, "-c", LARGEST, "26"], capture_output=True, text=True, check=True).stdout.split()
-    before, most = (1024 * float(x) / 1e9 for x in out)
-    computed = bytes_needed(made_up(26)[0], 26) / 1e9
-    note = f"most resident memory of a process; {before:.2g} GB of it before the solve; tables computed as {computed:.2g} GB"
-    yield Figure("memory", "N = 26, one solve, measured", most, "GB", note=note)
+    for n, limit in ((26, None), (28, bar)):
+        started = time.perf_counter()
+        out = subprocess.run([sys.executable, "-c", LARGEST, str(n)], capture_output=True, text=True, check=True).stdout.split()
+        before, most = (1024 * float(x) / 1e9 for x in out)
+        note = f"most resident memory of a process, {before:.2g} GB of it before the solve; {time.perf_counter() - started:.3g} s in all"
+        yield Figure("memory", f"N = {n}, one solve, measured", most, "GB", limit, note=note)
 
 
 def _agreement(quick: bool) -> Iterator[Figure]:
@@ -140,15 +193,16 @@ def _agreement(quick: bool) -> Iterator[Figure]:
 
 
 FIRST = """
-import time
+import sys, time
 started = time.perf_counter()
-from app.sequencing.warming import warm_up
-loaded = time.perf_counter()
-warm_up()
-warm = time.perf_counter()
 import numpy as np
 from app.benches.sequencing import made_up
 from app.sequencing.shortest import shortest_sequence
+from app.sequencing.warming import warm_up
+loaded = time.perf_counter()
+if "warm" in sys.argv:
+    warm_up()
+warm = time.perf_counter()
 problem, w = made_up(12)
 begin = time.perf_counter()
 shortest_sequence(problem, w)
@@ -156,17 +210,23 @@ print(loaded - started, warm - loaded, time.perf_counter() - begin)
 """
 
 
-def _first_call() -> Iterator[Figure]:
-    """A fresh process with the compiled kernels on disk, as a worker after the first start ever."""
-    out = subprocess.run([sys.executable, "-c", FIRST], capture_output=True, text=True, check=True).stdout.split()
-    yield Figure(
-        "first call",
-        "fresh process: warm-up of the worker, before anybody waits",
-        float(out[1]),
-        "s",
-        note=f"imports {float(out[0]):.2g} s",
-    )
-    yield Figure("first call", "fresh process: first solve after it, N = 12", 1e3 * float(out[2]), "ms", note="tables of the tool included")
+def _first_call(quick: bool) -> Iterator[Figure]:
+    """Fresh processes: as a worker after the first start, without a warm-up, and with nothing compiled on disk either."""
+    group = "first call"
+    imports, warm, first = _fresh("warm")
+    yield Figure(group, "fresh process: warm-up, before anybody waits", warm, "s", note=f"kernels on disk; imports {imports:.2g} s more")
+    yield Figure(group, "first solve after the warm-up, N = 12", 1e3 * first, "ms", note="tables of the tool included")
+    yield Figure(group, "first solve without a warm-up, kernels on disk", 1e3 * _fresh()[2], "ms", note="what the warm-up saves the user")
+    if not quick:
+        with TemporaryDirectory() as empty:
+            seconds = _fresh(cache=empty)[2]
+        yield Figure(group, "first solve, nothing compiled on disk", seconds, "s", note="once per installation, in the worker's warm-up")
+
+
+def _fresh(*words: str, cache: str | None = None) -> tuple[float, ...]:
+    env = os.environ if cache is None else os.environ | {"NUMBA_CACHE_DIR": cache}
+    out = subprocess.run([sys.executable, "-c", FIRST, *words], capture_output=True, text=True, check=True, env=env).stdout
+    return tuple(float(x) for x in out.split())
 
 
 def dijkstra(problem: SequencingProblem, w: Array) -> tuple[float, float]:
@@ -191,33 +251,49 @@ def _ratios(options: Options) -> Iterator[Figure]:
     agree = abs(cost - shortest_sequence(problem, w).cost)
     note = f"{seconds:.3g} s; our own networkx Dijkstra, graph built beforehand; costs differ by {agree:.1g}"
     yield Figure("ratio", f"our networkx Dijkstra / costs-to-go, N = {n}", 1e3 * seconds / ours, "x", note=note)
-    if options.checkout is None:
+    if options.checkout is None and options.reference_command is None:
         problem, w = made_up(9)
         model = model_for(problem, resolve(None, 9))
         _, ours = _best(lambda: costs_to_go(model, form_for(model, w), threads=False), 0.3)
-        note = "their 0.72 s was measured elsewhere, on a busy machine, not in this run: no verdict. --checkout measures here"
+        note = "their 0.72 s was measured elsewhere, on a busy machine, not in this run: no verdict. --authors measures here"
         yield Figure("ratio", "authors' Dijkstra as once measured / costs-to-go, N = 9", 1e3 * PUBLISHED_S[9] / ours, "x", note=note)
         return
-    yield _checkout(options)
+    yield _reference(options)
 
 
-def _checkout(options: Options) -> Figure:
-    """Their code through `apprentice_adapter.py`, a file that whoever compares puts into the checkout (docs/sequencing.md).
+def _reference(options: Options) -> Figure:
+    """Somebody else's search, run in their checkout by a command that whoever compares writes (docs/sequencing.md).
 
-    It is run there and prints two numbers: regions of the tool it solved, and seconds of their Dijkstra.
+    The command solves one tool. If the last line it prints ends with the number of regions and the seconds of the search alone,
+    these count; if not, its wall time does, and the tool must be named (`--reference-tool`).
     """
-    assert options.checkout is not None
-    adapter = options.checkout / "apprentice_adapter.py"
-    if not adapter.exists():
-        return Figure("ratio", "authors' Dijkstra / costs-to-go", 0.0, "x", 1e4, "at least", f"no {adapter.name} in the checkout: see docs")
-    out = subprocess.run([sys.executable, adapter.name], cwd=options.checkout, capture_output=True, text=True, check=True).stdout.split()
-    n, seconds = int(out[-2]), float(out[-1])
-    problem, w = made_up(n)
-    model = model_for(problem, resolve(None, n))
-    _, ours = _best(lambda: costs_to_go(model, form_for(model, w), threads=False), 0.3)
-    return Figure(
-        "ratio", f"authors' Dijkstra / costs-to-go, N = {n}", 1e3 * seconds / ours, "x", 1e4, "at least", f"theirs {seconds:.3g} s"
-    )
+    command = shlex.split(options.reference_command or f"{shlex.quote(sys.executable)} {ADAPTER}")
+    name, place = "authors' Dijkstra / costs-to-go", options.checkout or Path.cwd()
+    if options.reference_command is None and not (place / ADAPTER).exists():
+        return Figure("ratio", name, 0.0, "x", 1e4, "at least", f"no {ADAPTER} in the checkout and no --reference-command: see docs")
+    started = time.perf_counter()
+    out = subprocess.run(command, cwd=place, capture_output=True, text=True, check=True).stdout.split()
+    seconds, how = time.perf_counter() - started, "wall time of the whole command"
+    problem = _named_tool(options)
+    if len(out) > 1 and out[-2].isdigit():
+        n, seconds, how = int(out[-2]), float(out[-1]), "seconds it printed"
+        problem = problem if problem and problem.n == n else made_up(n, ())[0] if n in SHAPES else None
+    if problem is None:
+        return Figure("ratio", name, 0.0, "x", 1e4, "at least", "name the tool it solves: --data DIR --reference-tool real/8")
+    w, model = np.ones(len(problem.columns)), model_for(problem, resolve(None, problem.n))
+    shortest_sequence(problem, w)
+    ours, _ = _best(lambda: costs_to_go(model, form_for(model, w), threads=False), 0.3)
+    what = f"tool {options.reference_tool}" if options.reference_tool else "a made-up tool of as many regions"
+    note = f"theirs {seconds:.3g} s ({how}), ours {ours:.3g} ms wall on {what}"
+    return Figure("ratio", f"{name}, N = {problem.n}", 1e3 * seconds / ours, "x", 1e4, "at least", note)
+
+
+def _named_tool(options: Options) -> SequencingProblem | None:
+    """The tool called "real/8" or "synthetic/9" among the authors' tables."""
+    if options.reference_tool is None or options.data is None:
+        return None
+    kind, number = options.reference_tool.split("/")
+    return problem_for(read_tables("real" if kind == "real" else "synthetic", options.data)[int(number)].tool.graph, ())
 
 
 def _solver() -> Iterator[Figure]:
