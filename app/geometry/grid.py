@@ -1,7 +1,8 @@
 """Cut regions by one shared grid: straight cuts that run on from a region into its neighbours, as on the paper's real tools.
 
 Triangles are sliced where a grid line runs, so lines are straight whatever the mesh; every triangle at a new vertex is split on
-both sides of its edge, so a closed solid stays closed.
+both sides of its edge, so a closed solid stays closed. On a cylinder or cone the lines run around and along its axis, as if it
+were unrolled; those around it lie where a neighbour of the same length has its own.
 
 Paper: the real tools have rows of identical patches (tool 14 is 2 x 3), which no fit of primitives finds.
 """
@@ -12,8 +13,9 @@ import numpy as np
 
 from app.errors import InvalidInput
 from app.geometry.cleaning import areas, face_pairs
-from app.geometry.splitting import Integers, Surface, connected, cut_by_plane, quantiles, rectangle
+from app.geometry.splitting import Integers, Surface, connected, quantiles, rectangle
 from app.geometry.tool import Array
+from app.geometry.unrolling import Straight, Way, round_ways
 
 MOST_LINES = 20  # rows or columns
 SCRAP = 0.1  # pieces below this share of an average cell go to the neighbour in the same region with the longest common border
@@ -38,19 +40,19 @@ def grid_split(surface: Surface, regions: Sequence[int], rows: int, columns: int
     """
     _check(surface, regions, rows, columns)
     inside = np.isin(surface.labels, regions)
-    frame = grid_frame(surface, regions)
+    ways = grid_ways(surface, regions)
     old, together = surface.labels, int(surface.labels.max()) + 1
     # while the cuts run, all chosen regions are one; `cad_face` remembers the old labels, `source` the faces before the cuts
     joined = np.where(inside, together, old)
     tagged = Surface(surface.vertices, surface.faces, old.astype(np.int32), joined, np.arange(len(old)))
-    lines = [_lines(tagged, inside, frame[axis], count) for axis, count in ((0, columns), (1, rows))]
-    for axis in (0, 1):
-        for offset in lines[axis]:
-            tagged = cut_by_plane(tagged, together, frame[axis], float(offset))
+    lines = [_lines(tagged, inside, way, count) for way, count in zip(ways, (columns, rows), strict=True)]
+    for way, places, count in zip(ways, lines, (columns, rows), strict=True):
+        for place in [*places, *([np.pi] if count > 1 and way.closed else [])]:
+            tagged = way.cut(tagged, together, float(place))
     inside = tagged.labels == together
     middle = tagged.vertices[tagged.faces].mean(axis=1)
-    column = np.searchsorted(lines[0], middle @ frame[0])
-    row = rows - 1 - np.searchsorted(lines[1], middle @ frame[1])
+    column = np.searchsorted(lines[0], ways[0].at(middle))
+    row = rows - 1 - np.searchsorted(lines[1], ways[1].at(middle))
     region = tagged.cad_face.astype(np.int64) if keep_borders else np.full(len(middle), min(regions))
     cell = (region * rows + row) * columns + column
     labels = np.where(inside, -1, tagged.cad_face)
@@ -64,7 +66,7 @@ def grid_size(surface: Surface, regions: Sequence[int], cells: int, aspect: floa
     if not 1 <= cells <= MOST_LINES**2 or not 0.05 <= aspect <= 20:
         raise InvalidInput(f"Accepted are 1 to {MOST_LINES**2} cells and an aspect of 0.05 to 20; got {cells} and {aspect:g}.")
     corners = surface.vertices[surface.faces[np.isin(surface.labels, regions)]].reshape(-1, 3)
-    width, depth = np.maximum(np.ptp(corners @ grid_frame(surface, regions).T, axis=0), 1e-12)
+    width, depth = (max(way.unit * float(np.ptp(way.at(corners))), 1e-12) for way in grid_ways(surface, regions))
 
     def effort(rows: int, columns: int) -> float:
         return abs(np.log(rows * columns / cells)) * 2 + abs(np.log(width / columns / (depth / rows) / aspect))
@@ -82,6 +84,19 @@ def grid_frame(surface: Surface, regions: Sequence[int]) -> Array:
     return np.stack([across, along])
 
 
+def grid_ways(surface: Surface, regions: Sequence[int]) -> tuple[Way, Way]:
+    """Across and along the grid: straight, or unrolled where the regions together are one cylinder or cone."""
+    faces = surface.faces[np.isin(surface.labels, regions)]
+    found = round_ways(surface.vertices, faces)
+    if found is None:
+        across, along = grid_frame(surface, regions)
+        return Straight(across), Straight(along)
+    turning, straight = found
+    if abs(turning.tangent[0]) > abs(straight.direction[0]):
+        return turning.towards(_sign(turning.tangent, 0)), Straight(straight.direction * _sign(straight.direction, 1))
+    return Straight(straight.direction * _sign(straight.direction, 0)), turning.towards(_sign(turning.tangent, 1))
+
+
 def _sign(direction: Array, axis: int) -> float:
     """Which way makes the direction rise along `axis`, or along z where it has no part along it."""
     leading = direction[axis] if abs(direction[axis]) > 1e-9 else direction[2]
@@ -96,10 +111,10 @@ def _check(surface: Surface, regions: Sequence[int], rows: int, columns: int) ->
         raise InvalidInput(f"A grid of {rows} x {columns} was asked for; accepted are 1 to {MOST_LINES} rows and columns.")
 
 
-def _lines(surface: Surface, inside: np.ndarray, direction: Array, count: int) -> Array:
-    """Offsets of the grid lines that leave equal areas between them."""
+def _lines(surface: Surface, inside: np.ndarray, way: Way, count: int) -> Array:
+    """Places of the grid lines that leave equal areas between them."""
     faces = surface.faces[inside]
-    return quantiles(surface.vertices[faces] @ direction, areas(surface.vertices, faces), np.arange(1, count) / count)
+    return quantiles(way.corners(surface.vertices, faces), areas(surface.vertices, faces), np.arange(1, count) / count)
 
 
 def _whole(surface: Surface, inside: np.ndarray, cell: Integers) -> Integers:

@@ -103,14 +103,19 @@ def connected(group: NDArray[np.integer], pairs: Integers) -> Integers:
     return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
-def cut_by_plane(surface: Surface, region: int, normal: Array, offset: float) -> Surface:
-    """Split the triangles of `region` along the plane normal . x = offset, and their neighbours at the new vertices."""
+def cut_by_plane(surface: Surface, region: int, normal: Array, offset: float, ahead: NDArray[np.bool_] | None = None) -> Surface:
+    """Split the triangles of `region` along the plane normal . x = offset, and their neighbours at the new vertices.
+
+    With `ahead` (V,) only edges between two such vertices are split: a half plane cuts, not a plane.
+    """
     height = surface.vertices @ normal - offset
     height[np.abs(height) < ON_PLANE * np.linalg.norm(np.ptp(surface.vertices, axis=0))] = 0
     total = len(surface.vertices)
     inside = surface.faces[surface.labels == region]
     following = np.roll(inside, -1, axis=1)
     across = height[inside] * height[following] < 0
+    if ahead is not None:
+        across &= ahead[inside] & ahead[following]
     ends = np.sort(np.stack([inside[across], following[across]], axis=1), axis=1)
     crossed = np.unique(ends[:, 0] * total + ends[:, 1])
     if len(crossed) == 0:

@@ -95,3 +95,41 @@ def test_wrong_orders_are_refused() -> None:
         grid_split(plate(), [], 2, 2)
     with pytest.raises(InvalidInput, match="1 to 20"):
         grid_split(plate(), [0], 0, 2)
+
+
+def rolled(turn: float, radius: float = 2.0, cone: float = 0.0) -> Surface:
+    """Part of a cylinder (a cone with `cone` > 0) about the y axis, 3 long, its middle on top."""
+    angle, y = np.meshgrid(np.linspace(-turn / 2, turn / 2, 61), np.linspace(0, 3, 31), indexing="ij")
+    r = radius + cone * y
+    mesh, labels = open_surface(np.stack([r * np.sin(angle), y, r * np.cos(angle)], -1), np.zeros((60, 30), int))
+    return Surface(
+        mesh.vertices, mesh.faces.astype(np.int64), np.full(len(labels), -1, np.int32), labels.astype(np.int64), np.arange(len(labels))
+    )
+
+
+@pytest.mark.parametrize("cone", [0.0, 0.3])
+def test_a_round_region_is_cut_unrolled(cone: float) -> None:
+    """200 degrees in 5 columns: each spans 40 degrees of arc, also where it hangs over; by straight cuts they would differ."""
+    cut = grid_split(rolled(np.radians(200), cone=cone), [0], 1, 5)
+    spans = []
+    for k in range(5):
+        x, _, z = cut.vertices[np.unique(cut.faces[cut.labels == k])].T
+        angle = np.degrees(np.arctan2(x, z))
+        spans.append([angle.min(), angle.max()])
+    assert np.sort(spans, axis=0) == pytest.approx(np.array([[-100 + 40 * k, -60 + 40 * k] for k in range(5)]), abs=0.3)
+
+
+def test_a_ring_is_cut_all_around() -> None:
+    cut = grid_split(rolled(np.radians(359.9)), [0], 2, 4)
+    total = areas(cut.vertices, cut.faces).sum()
+    assert list(cell_areas(cut).values()) == pytest.approx([total / 8] * 8, rel=0.01)
+
+
+def test_lines_around_a_cylinder_meet_those_of_the_plane_beside_it() -> None:
+    """Plane and cylinder of the same length along the axis: both have their three rows at the same y."""
+    flat, bent = plate(1), rolled(np.radians(90))
+    for surface in (flat, bent):
+        cut, long = grid_split(surface, [0], 3, 1), float(np.ptp(surface.vertices[:, 1]))
+        for k in range(3):
+            y = cut.vertices[np.unique(cut.faces[cut.labels == k])][:, 1] / long * 3
+            assert sorted([y.min(), y.max()]) == pytest.approx([2 - k, 3 - k], abs=1e-2)
