@@ -105,4 +105,4 @@ def _on_axis(centres: Array, cross: Array, axis: Array) -> Array:
     here = np.einsum("ij,ij->i", side, centres)
     middle = centres.mean(axis=0)
     rows, values = np.vstack([side, axis * np.abs(side).max()]), np.append(here, (middle @ axis) * np.abs(side).max())
-    return np.linalg.lstsq(rows, values, rcond=None)[0]
+    return np.asarray(np.linalg.lstsq(rows, values, rcond=None)[0], np.float64)
