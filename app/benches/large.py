@@ -19,6 +19,7 @@ from app.sequencing.shortest import gap_between, shortest_sequence
 SHAPES = {12: (3, 4), 30: (5, 6), 50: (5, 10), 75: (5, 15), 100: (10, 10)}
 SOLVER_SECONDS = 30.0
 TARGET_GAP = 0.1
+QUICK_STEPS = 60
 FEWER_STEPS = 300  # of the bound above 50 regions, where each takes longer
 
 
@@ -89,17 +90,16 @@ def beyond(options: Options) -> Iterator[Figure]:
     lower_bound(small.problem, small.w, 1.0, steps=2)
     for n in (30,) if options.quick else (30, 50, 75, 100):
         for case in cases(n, options.quick):
-            yield from _ours(case, n)
-    yield from _against_exact()
+            yield from _ours(case, n, QUICK_STEPS if options.quick else STEPS if n <= 50 else FEWER_STEPS)
+    yield from _against_exact(options.quick)
     if find_spec("didppy") and not options.quick:
         yield from _against_solver()
 
 
-def _ours(case: Case, n: int) -> Iterator[Figure]:
+def _ours(case: Case, n: int, steps: int) -> Iterator[Figure]:
     begun = time.process_time()
     cost = case.problem.cost(case.w, best_found(case.problem, case.w))
     found, begun = time.process_time() - begun, time.process_time()
-    steps = STEPS if n <= 50 else FEWER_STEPS
     gap = gap_between(cost, lower_bound(case.problem, case.w, cost, steps=steps))
     spent = time.process_time() - begun
     group, bar = f"beyond, N = {n}", n == 50
@@ -110,12 +110,12 @@ def _ours(case: Case, n: int) -> Iterator[Figure]:
     yield Figure(group, f"{case.name}: gap", 100 * gap, "%", 100 * TARGET_GAP if bar else None, note=note)
 
 
-def _against_exact() -> Iterator[Figure]:
+def _against_exact(quick: bool) -> Iterator[Figure]:
     worst, loosest = 0.0, 0.0
     for case in cases(12, False):
         exact = shortest_sequence(case.problem, case.w).cost
         found = case.problem.cost(case.w, best_found(case.problem, case.w))
-        bound = lower_bound(case.problem, case.w, found)
+        bound = lower_bound(case.problem, case.w, found, steps=QUICK_STEPS if quick else STEPS)
         worst, loosest = max(worst, gap_between(found, exact)), max(loosest, gap_between(exact, bound))
         assert bound <= exact + 1e-9 * abs(exact)
     yield Figure("beyond, N = 12", "best found above the optimum, worst", 100 * worst, "%", 0.0001)
