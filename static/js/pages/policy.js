@@ -168,7 +168,7 @@ function paintProof() {
   doubt.show(state.policy, state.tool, plan);
   const fact = (term, value, tip = null) => h("div.fact", { dataset: tip ? { tip } : {} }, h("dt", {}, term), h("dd", {}, value));
   fill(parts.facts, fact("Cost", number(plan.cost), "C = w · Φ, added along the order; low is good"),
-    fact("Equally cheap", plan.ties === 1 ? "this one only" : `${Number(plan.ties).toLocaleString("en")} orders`, "Orders in the lowest cost class (relative 1e-7)"),
+    fact("Equally cheap", plan.ties === 1 ? (plan.proved ? "this one only" : "not counted") : `${Number(plan.ties).toLocaleString("en")} orders`, "Orders in the lowest cost class (relative 1e-7)"),
     fact("Effort", plan.effort === null ? "not taught yet" : number(plan.effort), "eta, Eq. 8: breaks ties among equally cheap orders"),
     fact("Tie settled by", plan.tie_settled_by ?? (plan.ties === 1 ? "no tie" : "lowest letters")));
 }
