@@ -142,7 +142,7 @@ def _spread(vertices, faces, start, around, origin, middle):  # pragma: no cover
         for k in range(3):
             gap += (vertices[v, k] - middle[k]) ** 2
         far[v] = np.sqrt(gap)
-        heapq.heappush(heap, (far[v], v))
+        heapq.heappush(heap, (far[v], v))  # pyright: ignore[reportArgumentType]
     while heap:
         known, v = heapq.heappop(heap)
         if known > far[v] or visits[v] >= MOST_VISITS:

@@ -13,11 +13,9 @@ const COLUMNS = [
   { key: "name", words: "Region", order: (a, b) => a.name.localeCompare(b.name, "en", { numeric: true }) },
   { key: "description", words: "Where", order: (a, b) => a.description.localeCompare(b.description) },
   { key: "area", words: "cm\u00b2", tip: "Surface area in square centimetres", order: by((region) => region.area_mm2), text: (region) => fixed(region.area_mm2 / 100) },
-  { key: "size", words: "Size", wide: true, tip: "Length by width along its surface in centimetres; cylinders and cones are measured unrolled, others as seen straight on", order: by((region) => region.length_mm ?? 0), text: (region) => (region.length_mm ? `${fixed(region.length_mm / 10)} \u00d7 ${fixed(region.width_mm / 10)}` : "-") },
-  { key: "aspect", words: "Aspect", wide: true, tip: "Length over width along its surface: 1 is as long as wide", order: by((region) => region.aspect ?? 0), text: (region) => fixed(region.aspect ?? NaN) },
+  { key: "aspect", words: "Aspect", wide: true, tip: "Length over width along its surface, cylinders and cones unrolled: 1 is as long as wide", order: by((region) => region.aspect ?? 0), text: (region) => fixed(region.aspect ?? NaN) },
   { key: "height", words: "Height", tip: "Highest point: 0 is the lowest of the working surface, 1 the highest", order: by((region) => region.height), text: (region) => fixed(region.height, 2) },
   { key: "curvature", words: "1/m", tip: "Strongest curvature, one over the radius in metres; positive is convex", order: by((region) => region.curvature_per_m), text: (region) => fixed(region.curvature_per_m) },
-  { key: "border", words: "Border", wide: true, tip: "Length of its border in centimetres", order: by((region) => region.perimeter_mm ?? 0), text: (region) => fixed((region.perimeter_mm ?? NaN) / 10) },
   { key: "free", words: "Free", wide: true, tip: "Part of its border that touches no other region, in centimetres", order: by((region) => region.free_border_mm ?? 0), text: (region) => fixed((region.free_border_mm ?? NaN) / 10) },
 ];
 
@@ -176,10 +174,11 @@ export class RegionTable {
     const tilt = (Math.acos(Math.max(-1, Math.min(1, region.normal[2]))) * 180) / Math.PI;
     const round = ["cylinder", "sphere"].includes(region.kind) && Math.abs(region.curvature_per_m) > 1e-3;
     const shape = `${region.kind}${round ? `, radius ${number(1000 / Math.abs(region.curvature_per_m))} mm` : ""}, tilted ${number(tilt, 2)}\u00b0`;
+    const size = region.length_mm === null ? "" : `, ${number(region.length_mm / 10)} \u00d7 ${number(region.width_mm / 10)} cm`;
     const border = region.perimeter_mm === null ? "" : `Border ${number(region.perimeter_mm / 10)} cm, ${number(region.free_border_mm / 10)} cm free; `;
     const touches = region.neighbours.length ? `touches ${this.beside(region)}` : "touches no other region";
     const middle = `Middle at ${region.centroid_mm.map((x) => number(x)).join(", ")} mm`;
-    return [h("p", { dataset: { tip: `${KINDS[region.kind]}. ${middle}` } }, h("b", {}, region.name), ` ${shape}`), h("p", { onpointerenter: tipWhenCut }, border ? border + touches : touches)];
+    return [h("p", { dataset: { tip: `${KINDS[region.kind]}. ${middle}` } }, h("b", {}, region.name), ` ${shape}${size}`), h("p", { onpointerenter: tipWhenCut }, border ? border + touches : touches)];
   }
 
   // Its neighbours, with the angle to each once that is known.
