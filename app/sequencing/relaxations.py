@@ -115,7 +115,7 @@ def _fill(price: Array, area: Array, fixed: NDArray[np.int8], slope: float, need
     held, value = 0, 0.0
     for a in order:
         if fixed[a] == 1:
-            value += price[a]
+            value += float(price[a])
         elif fixed[a] == 0:
             x, j = price[a] + slope * area[a], min(held, need)
             while j > 0 and key[j - 1] > x:
@@ -124,5 +124,5 @@ def _fill(price: Array, area: Array, fixed: NDArray[np.int8], slope: float, need
             key[j], region[j] = x, a
             held += 1
     for i in range(need):
-        value += key[i]
+        value += float(key[i])
     return value
