@@ -68,6 +68,8 @@ def request_of(method: str, path: str, operation: dict[str, Any]) -> dict[str, A
         request["headers"]["If-Match"] = '"1"'
     if "kind" in needed:
         request["params"] = {"kind": "performance"}
+    if "sequence" in needed:
+        request["params"] = {"sequence": "0,1,2"}
     if operation["operationId"] in UPLOADS:
         request["files"] = {"file": UPLOADS[operation["operationId"]]}
     elif operation["operationId"] in BODIES:
