@@ -254,6 +254,9 @@ def first_free(host: str, port: int) -> socket.socket:
 
 def run(settings: Settings, listener: socket.socket, *, announce: bool, browser: bool = False) -> None:
     """Serve on `listener` until stopped; `announce` makes the sample project first and says where it is."""
+    from app.prepare import compile_once
+
+    compile_once(typer.echo)
     typer.echo("Starting Apprentice ...")
     from app.main import create_app
 

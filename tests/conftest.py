@@ -17,6 +17,7 @@ from typing import Any
 import httpx
 import pytest
 
+from app.prepare import compile_once
 from app.settings import Settings
 
 with warnings.catch_warnings():
@@ -27,6 +28,12 @@ ROOT = Path(__file__).resolve().parent.parent
 SHARED = ROOT.parent / "shared"
 START_LIMIT_S = 90
 PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """No test's patience pays for the compiler."""
+    if not session.config.option.collectonly:
+        compile_once(print)
 
 
 @pytest.fixture

@@ -13,6 +13,7 @@ CORE = ("geometry", "sequencing", "learning", "robot")
 ALLOWED: dict[str, set[str]] = {
     "errors": set(),
     "settings": set(),
+    "prepare": {"settings"},
     "geometry": {"errors"},
     "sequencing": {"errors", "geometry"},
     "learning": {"errors", "geometry", "sequencing"},
@@ -24,7 +25,7 @@ ALLOWED: dict[str, set[str]] = {
     "viewer": {"errors", "settings", "workflow", *CORE},
     "main": {"errors", "settings", "storage", "jobs", "workflow", "api", "viewer"},
     "benches": {"errors", "settings", "workflow", "viewer", *CORE},
-    "cli": {"errors", "settings", "storage", "workflow", "main", "benches", *CORE},
+    "cli": {"errors", "settings", "prepare", "storage", "workflow", "main", "benches", *CORE},
 }
 CORE_THIRD_PARTY = {"numpy", "scipy", "numba", "llvmlite", "trimesh", "mujoco", "clarabel", "cascadio", "networkx"}
 FORBIDDEN_IN_CORE = {
