@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 
 from app.settings import ROOT
 
@@ -35,7 +36,8 @@ def compile_once(say: Callable[[str], None]) -> None:
     if any([process.wait() for process in processes]):
         say("Not everything could be compiled beforehand; the first answers will take longer.")
         return
-    if os.access(STAMP.parent, os.W_OK):
+    with suppress(OSError):  # a folder nobody may write to: Numba keeps its code elsewhere, and looks itself what is old
+        STAMP.parent.mkdir(exist_ok=True)
         STAMP.write_text(wanted)
 
 
