@@ -166,7 +166,7 @@ def test_edits_by_table_and_keyboard(desk: Studio) -> None:
 
     page.locator("tr[data-region='1']").click()
     page.keyboard.press("Shift+L")
-    page.get_by_role("button", name="Unlock B").wait_for()
+    page.get_by_role("button", name="Unlock B", exact=True).wait_for()
     page.keyboard.press("Shift+G")
     page.get_by_role("button", name="Cut into 2 × 2").click()
     fault = page.locator(".finish .fault")
