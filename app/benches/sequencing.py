@@ -35,13 +35,13 @@ PUBLISHED_S = {9: 0.72, 10: 3.7}  # the authors' Dijkstra, best of contended run
 
 def measure(options: Options) -> Iterator[Figure]:
     """Everything about the exact search; what lies beyond 2^N comes from its own module."""
+    yield from _memory(options.quick)  # first: a process begins with the most memory its parent ever had
     sizes = (12, 16) if options.quick else (12, 16, 20, 24, 26)
-    for n in sizes:
-        yield from _solves(n, (), "separable", bars=True)
-        yield from _solves(n, None, "with two interactions", bars=False)
+    for interactions, words in (((), "separable"), (None, "with two interactions")):
+        for n in sizes:
+            yield from _solves(n, interactions, words)
     yield from _by_last((10,) if options.quick else (12, 18, 20))
     yield from _omega((12,) if options.quick else (12, 16, 20))
-    yield from _memory(options.quick)
     yield from _agreement(options.quick)
     yield from _first_call(options.quick)
     yield from _ratios(options)
@@ -81,7 +81,7 @@ def _best(call: Callable[[], object], seconds: float) -> tuple[float, float]:
     return 1e3 * min(wall), 1e3 * min(cpu)
 
 
-def _solves(n: int, interactions: tuple[()] | None, words: str, bars: bool) -> Iterator[Figure]:
+def _solves(n: int, interactions: tuple[()] | None, words: str) -> Iterator[Figure]:
     """One solve under new weights, tables ready, by the wall clock on the threads the product uses: the part that is the dynamic
     program, and the whole answer."""
     problem, w = made_up(n, interactions)
@@ -91,7 +91,7 @@ def _solves(n: int, interactions: tuple[()] | None, words: str, bars: bool) -> I
         problem.tensor()  # the learner has it at these sizes: the cost in double precision is read from it
     prepared = 1e3 * (time.process_time() - started)
     shortest_sequence(problem, w)  # threads started, buffers touched
-    group, bar = f"exact, {words}", BARS_MS.get(n) if bars else None
+    group, bar = f"exact, {words}", BARS_MS.get(n) if interactions == () else None
     one_wall, one = _best(lambda: costs_to_go(model, form_for(model, w), threads=False), 0.5)
     two = uses_threads(n)
     wall = _best(lambda: costs_to_go(model, form_for(model, w)), 0.5)[0] if two else one_wall
@@ -104,7 +104,7 @@ def _solves(n: int, interactions: tuple[()] | None, words: str, bars: bool) -> I
     if two:
         yield Figure(group, f"N = {n}, speed-up of 2 threads", one_wall / wall, "x", note="wall against wall; a busy machine lowers it")
     yield Figure(group, f"N = {n}, tables of the tool, once (cpu)", prepared, "ms")
-    if n == 20 and not bars:
+    if n == 20 and interactions is None:
         _, classes = _best(lambda: best_classes(problem, w, 10), 0.5)
         yield Figure(group, "N = 20, ten best cost classes, counted (cpu)", classes, "ms")
 
