@@ -1,6 +1,6 @@
 """Policies and the plans they make for tools."""
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Response
 from pydantic import Field
@@ -134,10 +134,12 @@ class Plan(Row):
     tool_name: str
     sequence: list[int]
     cost: float
-    ties: int
+    ties: int  # orders of this cost, this one included
+    counted: Literal["exactly", "at least"]  # how `ties` is meant
     proved: bool
     bound: float | None  # no order costs less; null when nothing can be said
     gap: float | None  # (cost - bound) / |cost|: 0 when proved
+    looking: bool  # a closer bound is being looked for, half a minute at most; each one is told as plan.changed
     sureness: str  # "Proved optimal", or "Best found, at most x % above the optimum"
     method: str
     orders: str

@@ -20,6 +20,7 @@ class Prediction:
     sequence: tuple[int, ...]
     cost: float
     ties: int  # sequences of this cost, this one included
+    counted: bool  # False: there may be more ties than `ties`
     proved: bool  # no sequence is cheaper, for certain
     bound: float  # no sequence costs less; -inf when nothing can be said
     method: str
@@ -67,6 +68,7 @@ def predict(
         sequence=best.sequence,
         cost=best.cost,
         ties=best.ties,
+        counted=best.counted,
         proved=best.proved,
         bound=bound,
         method=best.method,

@@ -1,7 +1,7 @@
 """Which kind of background work is done by whom."""
 
 from app.jobs.dispatcher import Jobs
-from app.workflow import import_job, playback_job, training_job
+from app.workflow import bound_job, import_job, playback_job, training_job
 from app.workflow.values import Values
 
 WARM_UP = (
@@ -17,3 +17,4 @@ def register(jobs: Jobs, values: Values) -> None:
     jobs.register(import_job.KIND, import_job.handler(jobs.store, values))
     jobs.register(training_job.KIND, training_job.handler(values))
     jobs.register(playback_job.KIND, playback_job.handler(jobs.store, values))
+    jobs.register(bound_job.KIND, bound_job.handler(values))

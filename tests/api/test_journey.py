@@ -125,7 +125,7 @@ def test_teaching_to_the_robot(api: Api, sample: dict[str, Any]) -> None:
     assert {p["id"] for p in api.get(f"/projects/{project}/policies")["items"]} >= {run["policy_id"]}
     plan = api.post(f"/policies/{policy['id']}/plans", {"tool_id": tool["id"]})
     assert sorted(plan["sequence"]) == list(range(tool["region_count"]))
-    assert plan["proved"] is True
+    assert (plan["proved"], plan["counted"], plan["looking"]) == (True, "exactly", False)
     assert sum(step["total"] for step in plan["steps"]) == pytest.approx(plan["cost"])
     for step in plan["steps"]:
         assert sum(step["parts"]) == pytest.approx(step["total"])
@@ -185,7 +185,7 @@ def check_left_out(api: Api, policy: str, tool: str) -> None:
 
 
 def check_thirty_regions(api: Api, project: str, policy: str) -> None:
-    """A grid of 30 regions as a table: too many to prove an order, so the plan says how far off it may be."""
+    """A grid of 30 regions as a table: too many to prove an order, so the plan says how far off it may be, closer and closer."""
     rows = [f"r{i},{400 * (i % 6)},{300 * (i // 6)},400,300,{40 + 7 * (i * 5 % 11)},{i * 7 % 9 - 4}" for i in range(30)]
     table = "\n".join(["region,x_mm,y_mm,width_mm,depth_mm,height_mm,curvature_per_m", *rows])
     tool = api.upload(f"/projects/{project}/tools/region-table", "thirty.csv", table.encode())
@@ -194,6 +194,14 @@ def check_thirty_regions(api: Api, project: str, policy: str) -> None:
     plan = api.post(f"/policies/{policy}/plans", {"tool_id": tool["id"]})
     assert time.process_time() - began < 20  # seconds, compilers included
     assert sorted(plan["sequence"]) == list(range(30))
-    assert plan["proved"] is False
+    assert (plan["proved"], plan["counted"], plan["looking"]) == (False, "at least", True)
     assert plan["bound"] <= plan["cost"]
     assert re.fullmatch(r"Best found, at most [0-9.]+ % above the optimum", plan["sureness"])
+
+    closer = api.until(f"/plans/{plan['id']}", lambda row: row["bound"] > plan["bound"])
+    assert closer["bound"] <= plan["cost"] == closer["cost"]
+    assert closer["gap"] == pytest.approx((plan["cost"] - closer["bound"]) / plan["cost"])
+    assert closer["sureness"] != plan["sureness"]
+    final = api.until(f"/plans/{plan['id']}", lambda row: not row["looking"])
+    again = api.post(f"/policies/{policy}/plans", {"tool_id": tool["id"]})  # what was found counts, and nothing is looked for twice
+    assert (again["bound"], again["looking"]) == (final["bound"], False)

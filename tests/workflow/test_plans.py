@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.workflow.policies import sureness_words
+from app.workflow.policy_rows import sureness_words
 
 
 @pytest.mark.parametrize(
