@@ -9,22 +9,21 @@ import numpy as np
 from app.benches.effort_figures import effort_figures
 from app.benches.figures import Figure, Options
 from app.benches.studies import demonstrations
-from app.benches.teaching import SYNTHETIC_TRUTH, Taught, made_up_truths, teach
 from app.errors import InvalidInput
-from app.learning.answering import after_answer, candidates_for, next_pair, reply_of
 from app.learning.certified import certify
 from app.learning.certified_state import CertifiedParameters
+from app.learning.comparing import made_up_case
 from app.learning.evaluation import TRAINED_ON
 from app.learning.expert import ScriptedExpert
 from app.learning.generalising import LAYOUT, PENALTIES, Generalised, learn_generalising, on_features
 from app.learning.hits import HIT_SIZE, Outcome, judge
 from app.learning.maximum_entropy import lessons_of, surprise
-from app.learning.performance import performance_step, start_performance
+from app.learning.performance import start_performance
 from app.learning.performance_state import LearningDemonstration, PerformanceParameters
 from app.learning.qp import Array
+from app.learning.scripted import SYNTHETIC_TRUTH, Taught, answer_about, answer_pairs, answer_similarity
 from app.sequencing.classes import equivalent_sequences
 from app.sequencing.features import FEATURE_SETS
-from app.sequencing.shortest import shortest_sequence
 
 SEEDS, QUICK_SEEDS = 30, 3
 REPEATS = 20
@@ -51,7 +50,8 @@ def _synthetic(shown: Shown) -> Iterator[Figure]:
     trained, unseen = [[d for i, d in shown.items() if (i in TRAINED_ON["synthetic"]) is part] for part in (True, False)]
     truth = np.array(SYNTHETIC_TRUTH)
     tools = [d.problem for d in unseen]
-    runs = [teach(trained, tools, truth, parameters=CertifiedParameters()) for _ in range(5)]
+    expert = ScriptedExpert(truth, None)
+    runs = [answer_pairs(trained, tools, expert, parameters=CertifiedParameters(), clock=time.process_time) for _ in range(5)]
     weights = runs[0].weights
     yield Figure(group, "training tools hit", _hits(trained, weights), "of 6", 6, "at least", _sizes(trained, weights))
     yield Figure(group, "test tools hit", _hits(unseen, weights), "of 4", 4, "at least", _sizes(unseen, weights))
@@ -73,29 +73,22 @@ def _synthetic(shown: Shown) -> Iterator[Figure]:
 
 def _paper(trained: list[LearningDemonstration], truth: Array) -> tuple[Array, int, float]:
     """Algorithm 1 with the default hyperparameters: weights, answers, cpu seconds."""
-    expert, parameters, started = ScriptedExpert(truth, None), PerformanceParameters(), time.process_time()
-    state, answers = start_performance(trained, parameters, 0), dict[str, str]()
-    while True:
-        result = performance_step(trained, parameters, state, answers, parameters.iterations)
-        state = result.state
-        for q in result.questions:
-            d = trained[q.demonstration]
-            answers[q.fingerprint] = expert.similar(d.problem, d.sequence, q.candidate)
-        if result.outcome not in ("training", "questions"):
-            return result.weights, len(answers), time.process_time() - started
+    parameters, started = PerformanceParameters(), time.process_time()
+    result, answers = answer_similarity(trained, ScriptedExpert(truth, None), parameters, start_performance(trained, parameters, 0))
+    return result.weights, len(answers), time.process_time() - started
 
 
 def _made_up(shown: Shown, seeds: int) -> Iterator[Figure]:
     problems = {i: d.problem for i, d in shown.items()}
-    truths = made_up_truths(seeds, len(problems[1].columns))
     for count, bar in ((6, 2), (1, 10)):
         group = f"made-up experts ({seeds}), {count} demonstration{'s' if count > 1 else ''}, {10 - count} unseen tools"
         runs: list[Taught] = []
-        for k, truth in enumerate(truths):
+        for k in range(seeds):
             known = TRAINED_ON["synthetic"] if count == 6 else (list(problems)[k % len(problems)],)
-            demos = [LearningDemonstration(problems[i], shortest_sequence(problems[i], truth).sequence) for i in known]
-            runs.append(teach(demos, [p for i, p in problems.items() if i not in known], truth, seed=k))
-        spent = [r.answers + r.shown for r in runs]  # a tool whose two orders are both wrong has to be shown, which is work too
+            case = made_up_case(problems, known, k)
+            expert, tools = ScriptedExpert(case.truth, None), [d.problem for d in case.test]
+            runs.append(answer_pairs(list(case.train), tools, expert, seed=k, clock=time.process_time))
+        spent = [r.answers + r.shown for r in runs]  # a tool on which both orders are wrong is recorded, which is work too
         note = f"mean {np.mean(spent):.1f}, most {max(spent)}; until all samples choose the same order everywhere"
         yield Figure(group, "answers and tools shown, median", float(np.median(spent)), "", bar, "at most", note)
         yield Figure(group, "of these tools shown (both orders were wrong), mean", float(np.mean([r.shown for r in runs])))
@@ -125,15 +118,9 @@ def _real(data: Path, quick: bool) -> Iterator[Figure]:
 
 
 def _named(shown: LearningDemonstration, learned: Generalised, seed: int) -> bool:
-    """Whether the most probable class of orders after three answers is the recorded one (and of at most 64 orders)."""
+    """Whether the order that is settled after at most three answers is the recorded one, or has the same features."""
     wanted = equivalent_sequences(shown.problem, shown.sequence, HIT_SIZE).sequences
-    found = candidates_for(shown.problem, learned, np.random.default_rng(seed))
-    for _ in range(ANSWERS):
-        pair = next_pair(found)
-        if pair is None:
-            break
-        found = after_answer(found, pair, reply_of(found.classes[pair[0]][0], found.classes[pair[1]][0], wanted))
-    return shown.sequence in found.classes[found.best]
+    return answer_about(learned, shown.problem, wanted, seed, ANSWERS)[0] in wanted
 
 
 def _speed(shown: Shown) -> Iterator[Figure]:

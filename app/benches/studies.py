@@ -13,7 +13,9 @@ from app.benches.plots import QUANTITIES, Curve, Plot, as_svg, bars_as_svg
 from app.benches.report import ablation_table, comparison_tables, coverage_table, effort_table, save_report
 from app.learning.ablation import Ablation, ablate
 from app.learning.comparing import (
+    LEARNERS,
     TITLES,
+    Case,
     Score,
     format_comparison,
     learners,
@@ -26,7 +28,6 @@ from app.learning.comparing import (
 from app.learning.coverage_study import format_coverage, study_coverage
 from app.learning.effort_study import SideResult, study_effort
 from app.learning.evaluation import TRAINED_ON, Kind, read_tables, recorded_in
-from app.learning.expert import ScriptedExpert
 from app.learning.performance_state import LearningDemonstration
 from app.sequencing.problem import problem_for
 
@@ -44,18 +45,14 @@ def compare(data: Path, out: Path | None, say: Say, experts: int = 30, seed: int
     scores: list[Score] = []
     synthetic = demonstrations("synthetic", data)
     trained = TRAINED_ON["synthetic"]
-    columns = len(next(iter(synthetic.values())).problem.columns)
-    known = ScriptedExpert(np.ones(columns), None)
-    list(_all_learners([synthetic_case(synthetic, trained)], known, seed))  # compiles everything, so that times are times of learning
-    scores += _all_learners([synthetic_case(synthetic, trained)], known, seed)
+    list(_all_learners([synthetic_case(synthetic, trained)], seed))  # compiles everything, so that times are times of learning
+    scores += _all_learners([synthetic_case(synthetic, trained)], seed)
     say(format_comparison(summed(scores)) + "\n")
-    real = list(_all_learners(leave_one_out(demonstrations("real", data)), ScriptedExpert(None, None), seed))
+    real = list(_all_learners(leave_one_out(demonstrations("real", data)), seed))
     say(format_comparison(summed(real)) + "\n")
     scores += real
     problems = {i: d.problem for i, d in synthetic.items()}
-    invented: list[Score] = []
-    for case in made_up_cases(problems, trained, experts, seed):
-        invented += _all_learners([case], ScriptedExpert(case.truth, None), seed)
+    invented = list(_all_learners(list(made_up_cases(problems, trained, experts, seed)), seed))
     say(format_comparison(summed(invented)))
     scores += invented
     lines = summed(scores)
@@ -72,10 +69,10 @@ def compare(data: Path, out: Path | None, say: Say, experts: int = 30, seed: int
         )
 
 
-def _all_learners(cases: list[Any], expert: ScriptedExpert, seed: int) -> Iterator[Score]:
-    for name, learner in learners(expert, seed).items():
+def _all_learners(cases: list[Case], seed: int) -> Iterator[Score]:
+    for name in LEARNERS:
         for case in cases:
-            yield score(name, learner, case, seed, time.process_time)
+            yield score(name, learners(case, seed)[name], case, seed, time.process_time)
 
 
 def ablation(data: Path, out: Path | None, say: Say, seeds: int = 20, updates: int = 60) -> None:

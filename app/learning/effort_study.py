@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from app.learning.effort import EffortParameters, effort_step, start_effort
+from app.learning.effort import EffortParameters
 from app.learning.effort_features import ALL_COLUMNS, EFFORT_COLUMNS, effort_penalty
 from app.learning.expert import ScriptedExpert
 from app.learning.performance_state import LearningDemonstration
 from app.learning.qp import Array
+from app.learning.scripted import answer_preferences
 from app.sequencing.classes import CAP, optimal_sequences
 from app.sequencing.shortest import shortest_sequence
 
@@ -67,27 +68,13 @@ def _side(
     end, _, side = key.partition("_")
     preference = MORE[key] if key in MORE else f"{end}s {LIKED[side]}"
     expert = ScriptedExpert(weights, np.eye(parameters.width)[k])
-    learned, answers = _taught(trained, expert, weights, parameters)
-    return SideResult(preference, answers, *(_tally(part, weights, learned, expert) for part in (trained, unseen)))
+    result, answers = answer_preferences(trained, weights, parameters, expert.prefers)
+    return SideResult(preference, len(answers), *(_tally(part, weights, result.effort_weights, expert) for part in (trained, unseen)))
 
 
 def _tally(shown: list[LearningDemonstration], weights: Array, learned: Array, expert: ScriptedExpert) -> Tally:
     told = [o for d in shown if (o := _judged(d, weights, learned, expert)) is not None]
     return Tally(len(told), sum(b for b, _ in told), sum(a for _, a in told))
-
-
-def _taught(
-    trained: list[LearningDemonstration], expert: ScriptedExpert, weights: Array, parameters: EffortParameters
-) -> tuple[Array, int]:
-    answers: dict[str, str] = {}
-    state = start_effort(trained, weights, parameters, seed=0)
-    while True:
-        result = effort_step(trained, parameters, state, answers)
-        state = result.state
-        for q in result.questions:
-            answers[q.fingerprint] = expert.prefers(trained[q.demonstration].problem, q.left, q.right)
-        if result.outcome != "questions":
-            return result.effort_weights, len(answers)
 
 
 def _judged(shown: LearningDemonstration, weights: Array, learned: Array, expert: ScriptedExpert) -> tuple[bool, bool] | None:

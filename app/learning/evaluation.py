@@ -20,14 +20,15 @@ import numpy as np
 from app.errors import InvalidInput, NotFound
 from app.geometry.region_table import RegionTable, read_region_table
 from app.learning.coverage import CoverageReport, coverage
-from app.learning.effort import EffortParameters, EffortStepResult, effort_step, start_effort
+from app.learning.effort import EffortParameters, EffortStepResult
 from app.learning.expert import ScriptedExpert
 from app.learning.generalising import learn_unasked, on_features
 from app.learning.hits import HIT_GAP, HIT_SIZE, judge
-from app.learning.performance import performance_step, start_performance
+from app.learning.performance import start_performance
 from app.learning.performance_state import LearningDemonstration, PerformanceParameters, StepResult
 from app.learning.policy import Policy
 from app.learning.prediction import predict
+from app.learning.scripted import answer_preferences, answer_similarity
 from app.sequencing.features import FEATURE_SETS, Interaction
 from app.sequencing.problem import SequencingProblem, problem_for
 
@@ -105,8 +106,9 @@ def run_study(
     index = {number: k for k, number in enumerate(tables)}
     covered = coverage(list(problems.values()), [(index[i], recorded[i]) for i in trained], suspected)
     expert = _expert(kind, demonstrations[0])
-    result, answers = _teach(demonstrations, expert, parameters, seed, report)
-    effort, effort_answers = _teach_effort(demonstrations, result, seed)
+    begin = start_performance(demonstrations, parameters, seed)
+    result, answers = answer_similarity(demonstrations, expert, parameters, begin, report=report)
+    effort, effort_answers = answer_preferences(demonstrations, result.weights, EffortParameters(), _recorded_first, seed)
     features = demonstrations[0].problem.features
     policy = Policy(result.weights, features.name, features.version, INTERACTIONS[kind], effort.effort_weights, result.state.identifiable)
     tools = tuple(_evaluate(i, problems[i], recorded[i], i in trained, policy) for i in tables)
@@ -165,38 +167,10 @@ def _expert(kind: Kind, demonstration: LearningDemonstration) -> ScriptedExpert:
     return ScriptedExpert(np.r_[np.ones(n), np.zeros(len(demonstration.problem.columns) - n)], None)
 
 
-def _teach(
-    demonstrations: list[LearningDemonstration],
-    expert: ScriptedExpert,
-    parameters: PerformanceParameters,
-    seed: int,
-    report: Callable[[str], None],
-) -> tuple[StepResult, dict[str, str]]:
-    """Run Algorithm 1 to its end, answering as the expert."""
-    answers: dict[str, str] = {}
-    state = start_performance(demonstrations, parameters, seed)
-    while True:
-        result = performance_step(demonstrations, parameters, state, answers, parameters.iterations)
-        state = result.state
-        report(result.message)
-        for q in result.questions:
-            d = demonstrations[q.demonstration]
-            answers[q.fingerprint] = expert.similar(d.problem, d.sequence, q.candidate)
-        if result.outcome not in ("training", "questions"):
-            return result, answers
-
-
-def _teach_effort(demonstrations: list[LearningDemonstration], learned: StepResult, seed: int) -> tuple[EffortStepResult, dict[str, str]]:
-    """Run Algorithm 2 to its end; the recorded order, always shown on the left, is preferred."""
-    answers: dict[str, str] = {}
-    parameters = EffortParameters()
-    state = start_effort(demonstrations, learned.weights, parameters, seed)
-    while True:
-        result = effort_step(demonstrations, parameters, state, answers)
-        state = result.state
-        answers |= {q.fingerprint: "left" for q in result.questions}
-        if result.outcome != "questions":
-            return result, answers
+def _recorded_first(problem: SequencingProblem, left: tuple[int, ...], right: tuple[int, ...]) -> str:
+    """The recorded order, always shown on the left, is preferred."""
+    del problem, left, right
+    return "left"
 
 
 def _evaluate(number: int, problem: SequencingProblem, recorded: tuple[int, ...], trained: bool, policy: Policy) -> ToolResult:

@@ -10,6 +10,7 @@ from app.sequencing.problem import SequencingProblem
 from app.sequencing.shortest import TOLERANCE, shortest_sequence
 
 Sequence = tuple[int, ...]
+SAME = 1e-9  # relative: costs closer than this are equal to the expert
 
 
 @dataclass(frozen=True)
@@ -45,3 +46,10 @@ class ScriptedExpert:
             return "equal"
         gap = effort_penalty(problem, self.effort_weights, right) - effort_penalty(problem, self.effort_weights, left)
         return "equal" if abs(gap) < 1e-9 else ("left" if gap > 0 else "right")
+
+    def chooses(self, problem: SequencingProblem, left: Sequence, right: Sequence) -> str:
+        """'left', 'right', 'equal' or 'both_wrong': an order is how this expert would do it when it is a cheapest one."""
+        weights = np.zeros(len(problem.columns)) if self.weights is None else self.weights
+        best = shortest_sequence(problem, weights).cost
+        first, second = (problem.cost(weights, s) <= best + SAME * abs(best) for s in (left, right))
+        return {(True, True): "equal", (True, False): "left", (False, True): "right", (False, False): "both_wrong"}[first, second]

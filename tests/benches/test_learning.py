@@ -4,11 +4,10 @@ import numpy as np
 
 from app.benches.figures import Options
 from app.benches.learning import measure
-from app.benches.teaching import made_up_truths, reply, teach
-from app.learning.pairs import PairQuestion
-from app.learning.performance_state import LearningDemonstration
+from app.learning.comparing import made_up_case
+from app.learning.expert import ScriptedExpert
+from app.learning.scripted import answer_pairs
 from app.sequencing.problem import problem_for
-from app.sequencing.shortest import shortest_sequence
 from tests.conftest import shared
 from tests.sequencing.graphs import grid_graph
 
@@ -27,24 +26,22 @@ def test_figures_of_the_quick_bench():
 
 
 def test_the_scripted_expert_endorses_only_cheapest_orders():
-    problem, truth = problem_for(grid_graph(2, 3, 1), ()), np.arange(1.0, 12.0)
-    best = shortest_sequence(problem, truth).sequence
+    problem, expert = problem_for(grid_graph(2, 3, 1), ()), ScriptedExpert(np.arange(1.0, 12.0), None)
+    best = expert.sequence(problem)
     worst = best[::-1]
-
-    def asked(left: tuple[int, ...], right: tuple[int, ...]) -> str:
-        fields = {name: None for name in PairQuestion.__dataclass_fields__}
-        return reply(problem, PairQuestion(**{**fields, "left": left, "right": right}), truth)  # type: ignore[arg-type]
-
-    assert asked(best, worst) == "left"
-    assert asked(worst, best) == "right"
-    assert asked(worst, worst) == "both_wrong"
-    assert asked(best, best) == "equal"
+    assert expert.chooses(problem, best, worst) == "left"
+    assert expert.chooses(problem, worst, best) == "right"
+    assert expert.chooses(problem, worst, worst) == "both_wrong"
+    assert expert.chooses(problem, best, best) == "equal"
 
 
-def test_a_run_ends_with_every_tool_right_or_shown():
-    problems = [problem_for(grid_graph(2, 3, s), ()) for s in range(1, 5)]
-    (truth,) = made_up_truths(1, 11)
-    demos = [LearningDemonstration(p, shortest_sequence(p, truth).sequence) for p in problems[:2]]
-    done = teach(demos, problems[2:], truth)
-    assert done.wrong == 0
-    assert done.answers >= done.shown
+def test_a_run_ends_with_every_tool_right():
+    """Orders recorded because both shown ones were wrong are learned from: each counts, and none is wrong afterwards."""
+    problems = {s: problem_for(grid_graph(2, 3, s), ()) for s in range(1, 6)}
+    runs = []
+    for k in range(6):
+        case = made_up_case(problems, (1,), k)
+        runs.append(answer_pairs(list(case.train), [d.problem for d in case.test], ScriptedExpert(case.truth, None)))
+    assert sum(r.wrong for r in runs) == 0
+    assert all(r.shown <= r.answers for r in runs)
+    assert sum(r.shown for r in runs) > 0

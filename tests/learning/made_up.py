@@ -3,7 +3,7 @@
 import numpy as np
 
 from app.learning.expert import ScriptedExpert
-from app.learning.performance import LearningDemonstration, PerformanceParameters, PerformanceState, StepResult, performance_step
+from app.learning.performance import LearningDemonstration
 from app.sequencing.features import DEFAULT_INTERACTIONS
 from app.sequencing.problem import SequencingProblem, problem_for
 from tests.sequencing.graphs import grid_graph
@@ -17,23 +17,3 @@ def problems(count: int, rows: int = 2, columns: int = 3) -> list[SequencingProb
 
 def demonstrations(expert: ScriptedExpert, tools: list[SequencingProblem]) -> list[LearningDemonstration]:
     return [LearningDemonstration(p, expert.sequence(p)) for p in tools]
-
-
-def learn(
-    demos: list[LearningDemonstration],
-    expert: ScriptedExpert,
-    parameters: PerformanceParameters,
-    state: PerformanceState,
-    chunk: int,
-    answers: dict[str, str] | None = None,
-) -> tuple[StepResult, dict[str, str]]:
-    """Run to the end, answering as the expert; every answer is kept in the returned dictionary."""
-    answers = {} if answers is None else answers
-    while True:
-        result = performance_step(demos, parameters, state, answers, chunk)
-        state = result.state
-        for q in result.questions:
-            d = demos[q.demonstration]
-            answers[q.fingerprint] = expert.similar(d.problem, d.sequence, q.candidate)
-        if result.outcome not in ("training", "questions"):
-            return result, answers

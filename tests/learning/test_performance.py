@@ -18,8 +18,9 @@ from app.learning.performance import (
 )
 from app.learning.performance_conflict import Contradiction
 from app.learning.questions import appearance
+from app.learning.scripted import answer_similarity
 from app.sequencing.shortest import shortest_sequence
-from tests.learning.made_up import TRUE_WEIGHTS, demonstrations, learn, problems
+from tests.learning.made_up import TRUE_WEIGHTS, demonstrations, problems
 
 EXPERT = ScriptedExpert(TRUE_WEIGHTS, None)
 PARAMETERS = PerformanceParameters(iterations=20, rounds=6)
@@ -43,7 +44,7 @@ def asking_seed(demos) -> int:
 
 def test_known_weights_are_recovered(demos):
     """The learned weights make every demonstration of a known expert the cheapest (1e-9 relative), which random weights do not."""
-    result, _ = learn(demos, EXPERT, PARAMETERS, start_performance(demos, PARAMETERS, 0), 100)
+    result, _ = answer_similarity(demos, EXPERT, PARAMETERS, start_performance(demos, PARAMETERS, 0), 100)
     assert result.outcome == "converged"
 
     def excess(w):
@@ -70,7 +71,7 @@ def test_chunks_do_not_matter(demos):
 def test_interrupted_run_ends_with_the_same_weights(demos):
     """Every step in a new 'process' (through JSON), one iteration at a time, against one uninterrupted run with questions."""
     seed = asking_seed(demos)
-    whole, answers = learn(demos, EXPERT, ASKING, start_performance(demos, ASKING, seed), 1000)
+    whole, answers = answer_similarity(demos, EXPERT, ASKING, start_performance(demos, ASKING, seed), 1000)
     assert answers
     state, given = start_performance(demos, ASKING, seed), {}
     while True:
@@ -157,7 +158,7 @@ def contradiction() -> list[LearningDemonstration]:
 def test_contradicting_demonstrations_end_as_infeasible():
     """Of two nobody can say which one is wrong: both are named."""
     demos = contradiction()
-    result, _ = learn(demos, ScriptedExpert(None, None), CONTRADICTION, start_performance(demos, CONTRADICTION, 0), 1000)
+    result, _ = answer_similarity(demos, ScriptedExpert(None, None), CONTRADICTION, start_performance(demos, CONTRADICTION, 0), 1000)
     assert result.outcome == "infeasible"
     assert result.message.startswith("Demonstration 1 and demonstration 2 contradict each other")
     assert result.state.contradiction == Contradiction((0, 1), clear=False, alone=False, rest=False)
@@ -170,7 +171,7 @@ def test_one_reversed_among_five_is_named_after_few_questions(odd: int):
     six = demonstrations(EXPERT, problems(6))
     six[odd] = replace(six[odd], sequence=six[odd].sequence[::-1])
     parameters = PerformanceParameters()
-    result, answers = learn(six, ScriptedExpert(None, None), parameters, start_performance(six, parameters, 1), 7)
+    result, answers = answer_similarity(six, ScriptedExpert(None, None), parameters, start_performance(six, parameters, 1), 7)
     assert result.outcome == "infeasible"
     assert len(answers) <= 6
     assert result.state.round <= 2

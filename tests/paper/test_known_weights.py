@@ -6,10 +6,10 @@ import pytest
 from app.geometry.region_table import read_region_table
 from app.learning.expert import ScriptedExpert
 from app.learning.performance import LearningDemonstration, PerformanceParameters, start_performance
+from app.learning.scripted import answer_similarity
 from app.sequencing.problem import problem_for
 from app.sequencing.shortest import shortest_sequence
 from tests.conftest import shared
-from tests.learning.made_up import learn
 
 TRAINED, UNSEEN = (1, 2, 3, 6, 8, 9), (4, 5, 7, 10)
 TRUTHS = {
@@ -33,7 +33,7 @@ def test_known_expert_is_explained_and_predicted(problems, name):
     expert = ScriptedExpert(truth, None)
     demos = [LearningDemonstration(problems[i], expert.sequence(problems[i])) for i in TRAINED]
     parameters = PerformanceParameters()
-    result, _ = learn(demos, expert, parameters, start_performance(demos, parameters, 0), 100)
+    result, _ = answer_similarity(demos, expert, parameters, start_performance(demos, parameters, 0), 100)
     assert result.outcome == "converged"
     for d in demos:
         assert d.problem.cost(result.weights, d.sequence) <= shortest_sequence(d.problem, result.weights).cost * (1 + 1e-7)

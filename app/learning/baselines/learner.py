@@ -1,7 +1,7 @@
 """The one shape every learner has in a comparison."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -21,6 +21,9 @@ class Learned:
     order: Callable[[SequencingProblem], Sequence]  # for any tool with the features of the demonstrated ones
     policy: Policy | None  # None: there are no weights, only orders
     answers: int = 0  # of the expert
+    settled: Mapping[int, tuple[Sequence, ...]] = field(
+        default_factory=dict[int, tuple[Sequence, ...]]
+    )  # id of a problem -> the orders that questions about it settled on, all of equal features
 
 
 Learner = Callable[[list[LearningDemonstration], np.random.Generator], Learned]
