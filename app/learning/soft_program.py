@@ -75,3 +75,11 @@ def drawn(chosen: Array, n: int, uniform: Array) -> NDArray[np.int64]:
             found[m, step] = pick
             s |= 1 << pick
     return found
+
+
+def warm_up() -> None:
+    """Compile or load the kernels."""
+    values = np.zeros((4, 2, 1))
+    chosen = soft_to_go(values, np.zeros(1), 2)[1]
+    expected_sums(values, chosen, 2)
+    drawn(chosen, 2, np.full((1, 2), 0.5))

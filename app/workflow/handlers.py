@@ -9,6 +9,7 @@ WARM_UP = (
     "app.geometry.regions.warm_up",
     "app.learning.many_optima.warm_up",
     "app.learning.version_space.warm_up",
+    "app.learning.soft_program.warm_up",
 )
 
 

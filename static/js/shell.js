@@ -164,5 +164,6 @@ async function open(shell) {
   const again = gathered(() => shell.refresh().catch(complain), 300);
   listen("*", (type) => !QUIET.has(type) && again());
   listen("resync", again);
-  connect(shell.projectId);
+  await connect(shell.projectId);
+  again(); // what changed before the stream was open
 }

@@ -189,9 +189,9 @@ async function start() {
       h("div.card-head", { style: { "border-top": "var(--hair) solid var(--line)" } }, parts.title, parts.note), parts.detail, parts.stage)));
   fill(parts.matrices, skeleton(4, "3rem"));
   state.view = new View3D(parts.stage, { projectId: shell.projectId, name: "coverage" });
-  await load();
   const again = gathered(() => load().catch(complain), 200);
   for (const type of ["coverage.changed", "demonstration.changed", "tool.changed", "resync"]) listen(type, again);
+  await load();
 }
 
 try {

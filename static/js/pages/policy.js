@@ -159,16 +159,22 @@ function paintHead() {
     h("div.next", { style: { "margin-left": "0" } }, h("p", {}, h("span.kicker", {}, "Next: watch the robot"), "in simulation"), h("a.btn.primary", { href: pageAddress(shell.projectId, "robot", { plan: plan.id }) }, "Open on the robot")));
 }
 
+// A count of one that isn't complete says nothing.
+function equallyCheap({ ties, counted }) {
+  if (ties === 1) return counted === "exactly" ? "this one only" : "not counted";
+  return `${counted === "exactly" ? "" : "at least "}${Number(ties).toLocaleString("en")} orders`;
+}
+
 function paintProof() {
   const { plan } = state;
   parts.proof.dataset.proved = String(plan.proved);
   fill(parts.proof, icon(plan.proved ? "shield" : "warn"), h("div", {}, h("b", {}, plan.sureness),
-    h("span.small.muted", { dataset: plan.proved ? {} : { tip: plan.method } }, plan.exception ? wantedWords(plan.exception) : plan.proved ? `Cheapest of all ${plan.constraints ? "orders that keep what you asked" : `${plan.orders} orders`}, in ${number(plan.milliseconds, 2)} ms` : `${plural(plan.sequence.length, "region")} are too many to look at every order${plan.bound === null ? "" : `; none costs less than ${number(plan.bound)}`}.`)));
+    h("span.small.muted", { dataset: plan.proved ? {} : { tip: plan.method } }, plan.exception ? wantedWords(plan.exception) : plan.proved ? `Cheapest of all ${plan.constraints ? "orders that keep what you asked" : `${plan.orders} orders`}, in ${number(plan.milliseconds, 2)} ms` : `${plural(plan.sequence.length, "region")} are too many to look at every order${plan.bound === null ? "" : `; none costs less than ${number(plan.bound)}`}.${plan.looking ? " Looking for a closer limit." : ""}`)));
   certificate.show(state.policy, state.tool);
   doubt.show(state.policy, state.tool, plan);
   const fact = (term, value, tip = null) => h("div.fact", { dataset: tip ? { tip } : {} }, h("dt", {}, term), h("dd", {}, value));
   fill(parts.facts, fact("Cost", number(plan.cost), "C = w · Φ, added along the order; low is good"),
-    fact("Equally cheap", plan.ties === 1 ? (plan.proved ? "this one only" : "not counted") : `${Number(plan.ties).toLocaleString("en")} orders`, "Orders in the lowest cost class (relative 1e-7)"),
+    fact("Equally cheap", equallyCheap(plan), "Orders in the lowest cost class (relative 1e-7)"),
     fact("Effort", plan.effort === null ? "not taught yet" : number(plan.effort), "eta, Eq. 8: breaks ties among equally cheap orders"),
     fact("Tie settled by", plan.tie_settled_by ?? (plan.ties === 1 ? "no tie" : "lowest letters")));
 }
@@ -197,12 +203,26 @@ async function open(tool) {
   await plan(wishes.asked);
 }
 
+let planned = 0;
+
 async function plan(constraints) {
-  state.plan = await post(`/policies/${state.policy.id}/plans`, { tool_id: state.tool.id, constraints });
+  const mine = (planned += 1);
+  const made = await post(`/policies/${state.policy.id}/plans`, { tool_id: state.tool.id, constraints });
+  if (mine !== planned) return;
+  state.plan = made;
   state.order = [...state.plan.sequence];
   state.whatif = null;
   state.stepper.reset(state.order.length);
   paint();
+}
+
+// A closer limit was found for the plan that is shown; its order stays.
+async function closer() {
+  const { id } = state.plan;
+  const now = await get(`/plans/${encodeURIComponent(id)}`);
+  if (state.plan.id !== id) return;
+  state.plan = now;
+  paintProof();
 }
 
 // What the newest plan of this tool respects: wishes outlive a reload.
@@ -233,9 +253,7 @@ function showEmpty() {
       h("a.btn.primary", { href: pageAddress(shell.projectId, none ? "tools" : "teach") }, none ? "Go to the tools" : "Go to teach")));
 }
 
-async function start() {
-  await load();
-  if (!state.policy || !state.tools.length) return showEmpty();
+async function build() {
   state.stepper = new Stepper({ n: 1, onStep: showOrder, name: "Play the order" });
   parts.stage.append(h("div.bl", {}, h("div.play", {}, state.stepper.node)));
   state.stepper.node.style.flex = "1";
@@ -248,12 +266,23 @@ async function start() {
   await open(state.tools.find((tool) => tool.id === wanted) ?? state.tools.find((tool) => !tool.demonstrated) ?? state.tools[0]);
   addEventListener("resize", gathered(paintChart, 150));
   addEventListener("themechange", paint);
-  listen("policy.changed", gathered(() => load().then(() => open(state.tools.find((tool) => tool.id === state.tool.id) ?? state.tools[0])).catch(complain), 200));
-  return undefined;
+}
+
+// One reading after the other, so that what is told during one is read by the next and nothing is drawn twice.
+let reading = Promise.resolve();
+const anew = () => (reading = reading.then(read).catch(complain));
+
+async function read() {
+  await load();
+  if (!state.policy || !state.tools.length) return showEmpty();
+  return state.view ? open(state.tools.find((tool) => tool.id === state.tool.id) ?? state.tools[0]) : build();
 }
 
 try {
-  await start();
+  for (const type of ["policy.changed", "resync"]) listen(type, gathered(anew, 200));
+  const looked = gathered(() => closer().catch(complain), 100);
+  listen("plan.changed", ({ plan_id: id }) => id === state.plan?.id && state.plan.looking && looked());
+  await (reading = read());
 } catch (error) {
   showFault(shell.main, error);
   throw error;

@@ -147,10 +147,10 @@ async function start() {
       h("section.card", {}, h("div.card-head", {}, h("h2", {}, "Your own features"), h("button.btn.quiet.push", { type: "button", onclick: () => load().catch(complain) }, "Look again")), parts.own),
       h("section.card", {}, h("div.card-head", {}, h("h2", {}, "Small, middle, large"), h("span.push.small.muted", {}, "how coverage tells them apart")), parts.levels))));
   fill(parts.features, skeleton(6, "2.5rem"));
-  await load();
-  paintSave();
   const again = gathered(() => load().catch(complain), 200);
   for (const type of ["coverage.changed", "tool.changed", "resync"]) listen(type, again);
+  await load();
+  paintSave();
 }
 
 try {

@@ -236,7 +236,6 @@ async function start() {
   bind({ key: "ArrowLeft", shown: "←", name: "One second back", when: ready, run: () => seek(state.time - 1) });
   bind({ key: "ArrowRight", shown: "→", name: "One second on", when: ready, run: () => seek(state.time + 1) });
   bind({ key: "s", name: "Playback speed", when: ready, run: nextSpeed });
-  await open(plan);
   listen("job.progress", ({ job_id: job, fraction, message }) => {
     if (state.playback?.job?.id !== job) return;
     state.playback.job = { id: job, fraction, message };
@@ -244,6 +243,7 @@ async function start() {
   });
   listen("playback.changed", ({ playback_id: id }) => id === state.playback?.id && reload().catch(complain));
   listen("resync", () => reload().catch(complain));
+  await open(plan);
   addEventListener("resize", gathered(() => ready() && paintReady(), 150));
   addEventListener("themechange", paint);
   return undefined;

@@ -177,13 +177,13 @@ function history() {
 // ---- start -------------------------------------------------------------------------------------------------------------------
 
 try {
-  await load();
   const anew = gathered(() => load().catch(complain), 120);
   const tick = gathered(() => refreshRun().catch(complain), 600);
   listen("query.changed", anew);
   listen("run.changed", ({ run_id: id, state: now }) => (id === state.run?.id && now === state.run.state ? tick() : anew()));
   listen("job.progress", tick);
   listen("resync", anew);
+  await load();
 } catch (error) {
   showFault(shell.main, error);
   throw error;
