@@ -20,8 +20,9 @@ from app.learning.generalising import Generalised, on_features
 from app.learning.many_optima import sums_of
 from app.learning.qp import Array
 from app.learning.soft_program import drawn, soft_to_go
-from app.sequencing.classes import equivalent_sequences
+from app.sequencing.constraints import resolve
 from app.sequencing.features import FEATURE_SETS
+from app.sequencing.omega import equal_sums
 from app.sequencing.problem import SequencingProblem
 
 DRAWS = (200, 30)  # weights from the posterior, orders from each
@@ -134,8 +135,10 @@ def _expected(distance: Array, a: int, others: NDArray[np.int64]) -> NDArray[np.
 
 
 def _members(problem: SequencingProblem, order: Sequence) -> tuple[Sequence, ...]:
-    """All orders of equal features, lowest ids first."""
-    return tuple(sorted(equivalent_sequences(problem, order, MEMBERS).sequences))
+    """Orders of equal features, those with the lowest ids; a diverse choice would take ten times as long."""
+    graph = equal_sums(problem, order, resolve(None, problem.n))
+    assert graph is not None, "the tool is small"
+    return tuple(sorted({order, *graph.members(0.0, MEMBERS)}))
 
 
 def _distances(classes: tuple[tuple[Sequence, ...], ...]) -> Array:
