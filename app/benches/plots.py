@@ -8,15 +8,19 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-COLOURS = ("#1f5fa8", "#c2571a", "#2e7d4f", "#8a4fb0", "#6b6b6b")  # told apart in print and by most eyes
+COLOURS = ("#6d3f6b", "#c08a2e", "#56616b", "#c06a7f", "#9c7a5c", "#a3a9ab")  # the charts' in static/css/tokens.css
+INK, SOFT_INK, AXIS, GRID = "#171a1c", "#4b5257", "#85898a", "#e4e4e0"
+DASHES = ("", "8 4", "2 4", "10 4 2 4", "5 3", "1 3")  # so that lines on top of each other, or printed in grey, are told apart
+FONT = "Inter, 'Segoe UI', system-ui, 'Helvetica Neue', 'Noto Sans', 'DejaVu Sans', sans-serif"
 WIDTH, HEIGHT = 640, 400
-LEFT, RIGHT, TOP, BOTTOM = 64, 150, 40, 52
+LEFT, RIGHT, TOP, BOTTOM = 72, 148, 66, 54
 TICKS = 5  # about
+FAR_FROM_0 = 0.5  # an axis starts at 0 unless the lowest value is above this share of the highest
 
 QUANTITIES = {  # of the ablation: title and label of its plots
-    "spread": ("Spread of the samples' costs", "Deviation of cost / |w|"),
-    "shift": ("Shift of the cheapest samples at each update", "Distance of feature sums"),
-    "violations": ("Recorded orders that are not the cheapest", "Demonstrations"),
+    "spread": ("Spread of the samples' costs", "Standard deviation of cost / |w|"),
+    "shift": ("Shift of the cheapest samples at each update", "Distance, in spreads of the features"),
+    "violations": ("Recorded orders that are not the cheapest", "Training tools"),
 }
 
 
@@ -39,37 +43,65 @@ class Plot:
     x_label: str
     y_label: str
     curves: tuple[Curve, ...]
+    note: str = ""  # under the title: what lines and bands are
+
+
+@dataclass(frozen=True)
+class Bars:
+    """Horizontal bars, one group per label."""
+
+    title: str
+    label: str  # of the values' axis
+    labels: tuple[str, ...]
+    groups: dict[str, Array]  # name -> a value >= 0 per label
+    words: dict[str, tuple[str, ...]]  # name -> what stands at the end of each bar
+    note: str = ""
+    most: float = 0.0  # the axis reaches at least this far
 
 
 def as_svg(plot: Plot) -> str:
     """The plot as a stand-alone SVG document."""
     xs = np.concatenate([c.x for c in plot.curves])
     ys = np.concatenate([v for c in plot.curves for v in (c.y, c.low, c.high) if v is not None])
-    x_ticks, y_ticks = ticks(float(xs.min()), float(xs.max())), ticks(min(0.0, float(ys.min())), float(ys.max()))
+    lowest = float(ys.min()) if ys.min() > FAR_FROM_0 * ys.max() else min(0.0, float(ys.min()))
+    x_ticks, y_ticks = ticks(float(xs.min()), float(xs.max())), ticks(lowest, float(ys.max()))
     frame = _Frame(x_ticks[0], max(x_ticks[-1], float(xs.max())), y_ticks[0], y_ticks[-1])
-    parts = _opening(plot.title) + _grid(frame, y_ticks, plot.y_label) + _foot(plot.x_label, frame, x_ticks)
-    for k, curve in enumerate(plot.curves):
-        parts += _curve(curve, frame, COLOURS[k % len(COLOURS)], TOP + 12 + 20 * k)
+    parts = _opening(plot.title, plot.note, HEIGHT) + _grid(frame, y_ticks, plot.y_label) + _foot(plot.x_label, frame, x_ticks)
+    order = sorted(range(len(plot.curves)), key=lambda k: DASHES[k % len(DASHES)] != "")  # dashes on top: what is below shows through
+    for k in order:
+        parts += _curve(plot.curves[k], frame, k)
     return "\n".join([*parts, "</svg>"]) + "\n"
 
 
-def bars_as_svg(title: str, y_label: str, labels: tuple[str, ...], groups: dict[str, Array]) -> str:
-    """One group of bars per label, one bar per key of `groups`, as a stand-alone SVG document."""
-    y_ticks = ticks(0.0, float(max(v.max() for v in groups.values())))
-    frame, bottom = _Frame(0.0, float(len(labels)), y_ticks[0], y_ticks[-1]), HEIGHT - BOTTOM
-    parts = _opening(title) + _grid(frame, y_ticks, y_label)
-    thick = 0.8 / len(groups)
-    for k, (name, values) in enumerate(groups.items()):
-        colour = COLOURS[k % len(COLOURS)]
-        for j, value in enumerate(values):
-            x0, x1, top = frame.x(j + 0.1 + k * thick), frame.x(j + 0.1 + (k + 1) * thick), frame.y(float(value))
-            size = f'width="{x1 - x0:.1f}" height="{max(bottom - top, 0.5):.1f}"'
-            parts.append(f'<rect x="{x0:.1f}" y="{min(top, bottom - 0.5):.1f}" {size} fill="{colour}"/>')
-        parts += _legend(name, colour, TOP + 12 + 20 * k)
-    for j, label in enumerate(labels):
-        x, y = round(frame.x(j + 0.5)), bottom + 16
-        turned = f'transform="rotate(-25 {x} {y})"'
-        parts.append(f'<text x="{x}" y="{y}" text-anchor="end" font-size="11" {turned}>{escape(label)}</text>')
+def bars_as_svg(bars: Bars) -> str:
+    """The bars as a stand-alone SVG document, the first label on top."""
+    values = ticks(0.0, max(bars.most, *(float(v.max()) for v in bars.groups.values())))
+    margin, thick = 190, 24 / len(bars.groups) if len(bars.groups) > 1 else 18
+    step = thick * len(bars.groups) + 12
+    bottom = TOP + step * len(bars.labels)
+    legend = len(bars.groups) > 1
+    right = WIDTH - (118 if legend else 84)
+    scale = (right - margin) / values[-1]
+    parts = _opening(bars.title, bars.note, bottom + BOTTOM)
+    for value in values:
+        x = margin + value * scale
+        parts.append(f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{TOP}" y2="{bottom:.1f}" stroke="{AXIS if value == 0 else GRID}"/>')
+        parts.append(f'<text x="{x:.1f}" y="{bottom + 18:.1f}" text-anchor="middle" fill="{SOFT_INK}">{value:g}</text>')
+    parts.append(f'<text x="{(margin + right) / 2:.0f}" y="{bottom + 40:.1f}" text-anchor="middle">{escape(bars.label)}</text>')
+    for j, label in enumerate(bars.labels):
+        top = TOP + j * step + 6
+        middle = top + thick * len(bars.groups) / 2
+        parts.append(f'<text x="{margin - 10}" y="{middle + 4.5:.1f}" text-anchor="end">{escape(label)}</text>')
+        for k, (name, given) in enumerate(bars.groups.items()):
+            y, long = top + k * thick, max(float(given[j]) * scale, 1.0)
+            size = f'width="{long:.1f}" height="{thick - 2:.1f}" fill="{COLOURS[k % len(COLOURS)]}"'
+            parts.append(f'<rect x="{margin}" y="{y:.1f}" {size}/>')
+            words = f'<text x="{margin + long + 6:.1f}" y="{y + thick / 2 + 3:.1f}" font-size="12" fill="{SOFT_INK}">'
+            parts.append(f"{words}{escape(bars.words[name][j])}</text>")
+    for k, name in enumerate(bars.groups if legend else ()):
+        y = TOP + 10 + 20 * k
+        parts.append(f'<rect x="{right + 34}" y="{y - 10}" width="12" height="12" fill="{COLOURS[k % len(COLOURS)]}"/>')
+        parts.append(f'<text x="{right + 51}" y="{y}" font-size="12">{escape(name)}</text>')
     return "\n".join([*parts, "</svg>"]) + "\n"
 
 
@@ -101,12 +133,14 @@ class _Frame:
         return " ".join(f"{self.x(float(a)):.1f},{self.y(float(b)):.1f}" for a, b in zip(x, y, strict=True))
 
 
-def _opening(title: str) -> list[str]:
+def _opening(title: str, note: str, height: float) -> list[str]:
     return [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" font-family="sans-serif" font-size="13" role="img">',
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height:.0f}" width="{WIDTH}" height="{height:.0f}" '
+        f'font-family="{FONT}" font-size="13" fill="{INK}" role="img">',
         f"<title>{escape(title)}</title>",
-        f'<rect width="{WIDTH}" height="{HEIGHT}" fill="#ffffff"/>',
-        f'<text x="{LEFT}" y="22" font-size="15" font-weight="600">{escape(title)}</text>',
+        f'<rect width="{WIDTH}" height="{height:.0f}" fill="#ffffff"/>',
+        f'<text x="20" y="28" font-size="16" font-weight="600">{escape(title)}</text>',
+        f'<text x="20" y="48" font-size="12" fill="{SOFT_INK}">{escape(note)}</text>',
     ]
 
 
@@ -114,34 +148,37 @@ def _grid(frame: _Frame, y_ticks: list[float], y_label: str) -> list[str]:
     bottom, right, parts = HEIGHT - BOTTOM, WIDTH - RIGHT, []
     for value in y_ticks:
         at = frame.y(value)
-        parts.append(f'<line x1="{LEFT}" x2="{right}" y1="{at:.1f}" y2="{at:.1f}" stroke="#dddddd"/>')
-        parts.append(f'<text x="{LEFT - 8}" y="{at + 4:.1f}" text-anchor="end">{value:g}</text>')
+        parts.append(f'<line x1="{LEFT}" x2="{right}" y1="{at:.1f}" y2="{at:.1f}" stroke="{GRID}"/>')
+        parts.append(f'<text x="{LEFT - 8}" y="{at + 4:.1f}" text-anchor="end" fill="{SOFT_INK}">{value:g}</text>')
     middle = (TOP + bottom) / 2
-    turned = f'transform="rotate(-90 16 {middle:.0f})"'
-    parts.append(f'<line x1="{LEFT}" x2="{right}" y1="{bottom}" y2="{bottom}" stroke="#333333"/>')
-    parts.append(f'<text x="16" y="{middle:.0f}" text-anchor="middle" {turned}>{escape(y_label)}</text>')
+    turned = f'transform="rotate(-90 22 {middle:.0f})"'
+    parts.append(f'<line x1="{LEFT}" x2="{right}" y1="{bottom}" y2="{bottom}" stroke="{AXIS}"/>')
+    parts.append(f'<text x="22" y="{middle:.0f}" text-anchor="middle" {turned}>{escape(y_label)}</text>')
     return parts
 
 
 def _foot(x_label: str, frame: _Frame, x_ticks: list[float]) -> list[str]:
     bottom, middle = HEIGHT - BOTTOM, (LEFT + WIDTH - RIGHT) / 2
-    shown = [value for value in x_ticks if frame.x0 <= value <= frame.x1]
-    parts = [f'<text x="{frame.x(value):.1f}" y="{bottom + 18}" text-anchor="middle">{value:g}</text>' for value in shown]
-    return [*parts, f'<text x="{middle:.0f}" y="{HEIGHT - 12}" text-anchor="middle">{escape(x_label)}</text>']
+    parts = []
+    for value in x_ticks:
+        if frame.x0 <= value <= frame.x1:
+            x = frame.x(value)
+            parts.append(f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{bottom}" y2="{bottom + 5}" stroke="{AXIS}"/>')
+            parts.append(f'<text x="{x:.1f}" y="{bottom + 19}" text-anchor="middle" fill="{SOFT_INK}">{value:g}</text>')
+    return [*parts, f'<text x="{middle:.0f}" y="{HEIGHT - 14}" text-anchor="middle">{escape(x_label)}</text>']
 
 
-def _legend(name: str, colour: str, y: float) -> list[str]:
-    at = WIDTH - RIGHT + 14
-    return [
-        f'<line x1="{at}" x2="{at + 18}" y1="{y}" y2="{y}" stroke="{colour}" stroke-width="2"/>',
-        f'<text x="{at + 24}" y="{y + 4}">{escape(name)}</text>',
-    ]
-
-
-def _curve(curve: Curve, frame: _Frame, colour: str, legend_y: float) -> list[str]:
+def _curve(curve: Curve, frame: _Frame, k: int) -> list[str]:
+    colour, dash = COLOURS[k % len(COLOURS)], DASHES[k % len(DASHES)]
+    style = f'stroke="{colour}" stroke-width="2"' + (f' stroke-dasharray="{dash}"' if dash else "")
     parts = []
     if curve.low is not None and curve.high is not None:
         around = frame.path(np.r_[curve.x, curve.x[::-1]], np.r_[curve.low, curve.high[::-1]])
-        parts.append(f'<polygon points="{around}" fill="{colour}" fill-opacity="0.15"/>')
-    parts.append(f'<polyline points="{frame.path(curve.x, curve.y)}" fill="none" stroke="{colour}" stroke-width="2"/>')
-    return parts + _legend(curve.name, colour, legend_y)
+        parts.append(f'<polygon points="{around}" fill="{colour}" fill-opacity="0.16"/>')
+    parts.append(f'<polyline points="{frame.path(curve.x, curve.y)}" fill="none" {style}/>')
+    at, y = WIDTH - RIGHT + 14, TOP + 12 + 22 * k
+    return [
+        *parts,
+        f'<line x1="{at}" x2="{at + 30}" y1="{y}" y2="{y}" {style}/>',
+        f'<text x="{at + 38}" y="{y + 4}">{escape(curve.name)}</text>',
+    ]

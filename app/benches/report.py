@@ -9,8 +9,8 @@ from pathlib import Path
 
 from app.benches.plots import QUANTITIES
 from app.learning.ablation import Ablation
-from app.learning.comparing import TITLES, Line
-from app.learning.coverage_study import WHY, SubsetCoverage
+from app.learning.comparing import MEANS, Line, by_kind, not_best, title_of
+from app.learning.coverage_study import WHY, SubsetCoverage, subset_words
 from app.learning.effort_study import SideResult
 from app.learning.evaluation import StudyReport
 
@@ -49,10 +49,9 @@ def save_report(
 
 def comparison_tables(lines: Sequence[Line]) -> list[Table]:
     """One table per kind of tools."""
-    columns = ("Learner", "Training tools hit", "Unseen tools hit", "Hits", "Extra cost", "Agreement (tau)", "Answers", "Seconds of cpu")
+    columns = ("Learner", "Training tools hit", "Unseen tools hit", "Hits", "Extra cost", "Agreement (tau)", "Answers", "CPU seconds")
     tables = []
-    for kind in dict.fromkeys(line.kind for line in lines):
-        found = [line for line in lines if line.kind == kind]
+    for found in by_kind(lines):
         rows = tuple(
             (
                 *(line.learner, f"{line.train_success:.0%}", f"{line.test_success:.0%}", f"{line.test_hits}/{line.test}"),
@@ -61,9 +60,7 @@ def comparison_tables(lines: Sequence[Line]) -> list[Table]:
             )
             for line in found
         )
-        tables.append(
-            Table(TITLES.get(kind, f"{found[0].cases} made-up experts"), columns, rows, "Answers and seconds are means per case.")
-        )
+        tables.append(Table(title_of(found[0]), columns, rows, " ".join([MEANS, *not_best(found)])))
     return tables
 
 
@@ -82,9 +79,7 @@ def _interval(mean: float, low: float, high: float) -> str:
 def coverage_table(rows: Sequence[SubsetCoverage], kind: str) -> Table:
     """Table I beside ours."""
     columns = ("Tools", "Published", "Strict rule", "Shown at all", "Captured", "Shown", "Possible")
-    body = tuple(
-        (", ".join(map(str, r.tools)), r.published, round(r.strict, 2), round(r.plain, 2), r.captured, r.shown, r.possible) for r in rows
-    )
+    body = tuple((subset_words(r.tools), r.published, round(r.strict, 2), round(r.plain, 2), r.captured, r.shown, r.possible) for r in rows)
     return Table(f"Coverage of subsets of the authors' {kind} tools (Table I)", columns, body, WHY)
 
 

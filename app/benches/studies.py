@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from app.benches.plots import QUANTITIES, Curve, Plot, as_svg, bars_as_svg
+from app.benches.plots import QUANTITIES, Bars, Curve, Plot, as_svg, bars_as_svg
 from app.benches.report import ablation_table, comparison_tables, coverage_table, effort_table, save_report
 from app.learning.ablation import Ablation, ablate
 from app.learning.comparing import (
     LEARNERS,
-    TITLES,
     Case,
+    Line,
     Score,
     format_comparison,
     learners,
@@ -24,8 +24,9 @@ from app.learning.comparing import (
     score,
     summed,
     synthetic_case,
+    title_of,
 )
-from app.learning.coverage_study import format_coverage, study_coverage
+from app.learning.coverage_study import SubsetCoverage, format_coverage, study_coverage, subset_words
 from app.learning.effort_study import SideResult, study_effort
 from app.learning.evaluation import TRAINED_ON, Kind, read_tables, recorded_in
 from app.learning.performance_state import LearningDemonstration
@@ -60,13 +61,15 @@ def compare(data: Path, out: Path | None, say: Say, experts: int = 30, seed: int
     save_report(out, "compare", "Learners side by side", data, comparison_tables(lines), {"experts": experts})
     for kind in dict.fromkeys(line.kind for line in lines):
         found = [line for line in lines if line.kind == kind]
-        shares = {"hit": np.array([100 * line.test_success for line in found])}
-        names = tuple(line.learner for line in found)
-        _write(
-            out,
-            f"compare_{kind.replace(' ', '_')}.svg",
-            bars_as_svg(TITLES.get(kind, "Made-up experts"), "% of unseen tools", names, shares),
-        )
+        _write(out, f"compare_{kind.replace(' ', '_')}.svg", bars_as_svg(comparison_bars(found)))
+
+
+def comparison_bars(lines: list[Line]) -> Bars:
+    """Tools predicted without having been shown, per learner; lines of one kind."""
+    shares = {"hit": np.array([100 * line.test_success for line in lines])}
+    words = {"hit": tuple(f"{line.test_hits} of {line.test}" for line in lines)}
+    names = tuple(line.learner for line in lines)
+    return Bars(title_of(lines[0]), "Unseen tools on which the expert's order is chosen (%)", names, shares, words, most=100)
 
 
 def _all_learners(cases: list[Case], seed: int) -> Iterator[Score]:
@@ -93,11 +96,14 @@ def ablation(data: Path, out: Path | None, say: Say, seeds: int = 20, updates: i
 def ablation_plot(found: Ablation, quantity: str) -> Plot:
     """One of Fig. 4's three plots."""
     title, label = QUANTITIES[quantity]
-    x = np.arange(found.updates + 1.0)
+    first = 1 if quantity == "shift" else 0  # nothing has moved before the first update
+    x = np.arange(first, found.updates + 1.0)
     curves = tuple(  # none of the quantities can be negative, whatever the interval around its mean says
-        Curve(name, x, b[quantity].mean, np.maximum(b[quantity].low, 0.0), b[quantity].high) for name, b in found.bands.items()
+        Curve(name, x, b[quantity].mean[first:], np.maximum(b[quantity].low[first:], 0.0), b[quantity].high[first:])
+        for name, b in found.bands.items()
     )
-    return Plot(title, "Update", label, curves)
+    note = f"Mean of {found.seeds} runs and its 95 % confidence interval, {found.tools} training tools"
+    return Plot(title, "Update of the weights", label, curves, note)
 
 
 def coverage(data: Path, out: Path | None, say: Say) -> None:
@@ -106,8 +112,27 @@ def coverage(data: Path, out: Path | None, say: Say) -> None:
     for kind in ("synthetic", "real"):
         results[kind] = study_coverage(demonstrations(kind, data))
         say(format_coverage(results[kind], kind) + "\n")
+        _write(out, f"coverage_{kind}.svg", bars_as_svg(coverage_bars(results[kind], kind)))
     _save(out, "coverage.json", results)
     save_report(out, "coverage", "Coverage of four sets of demonstrations", data, [coverage_table(r, kind) for kind, r in results.items()])
+
+
+def coverage_bars(rows: list[SubsetCoverage], kind: str) -> Bars:
+    """Table I: what was published beside our two figures."""
+    found = {
+        "published": [r.published for r in rows],
+        "strict rule": [r.strict for r in rows],
+        "shown at all": [r.plain for r in rows],
+    }
+    return Bars(
+        f"Coverage of subsets of the authors' {kind} tools",
+        "Coverage rho",
+        tuple(f"tools {subset_words(r.tools)}" for r in rows),
+        {name: np.array(values) for name, values in found.items()},
+        {name: tuple(f"{v:.2f}" for v in values) for name, values in found.items()},
+        "The published numbers rest on levels that are not published, so they are shown beside ours only",
+        most=1.0,
+    )
 
 
 def effort(data: Path, out: Path | None, say: Say) -> None:
@@ -123,14 +148,23 @@ def effort(data: Path, out: Path | None, say: Say) -> None:
         say(f"{r.preference:19s}  {r.answers:7d}   {seen:>14s}   {new:>12s}")
     _save(out, "effort.json", found)
     save_report(out, "effort", "Before and after a preferred side is learned", data, [effort_table(found)])
-    shares = {at: np.array([100 * _share(r, at) for r in found]) for at in ("before", "after")}
-    labels = tuple(r.preference for r in found)
-    _write(out, "effort.svg", bars_as_svg("Chosen order has the least effort", "% of all tools it makes a difference on", labels, shares))
+    for part, words in (("trained", "training tools"), ("unseen", "unseen tools")):
+        _write(out, f"effort_{part}.svg", bars_as_svg(effort_bars(found, part, words)))
 
 
-def _share(result: SideResult, at: str) -> float:
-    both = (result.trained, result.unseen)
-    return sum(getattr(t, at) for t in both) / max(sum(t.tools for t in both), 1)
+def effort_bars(found: list[SideResult], part: str, words: str) -> Bars:
+    """Fig. 5: on how many tools the chosen order has the least effort, before and after learning."""
+    tallies, asked = [getattr(r, part) for r in found], [r.answers for r in found]
+    told = {f"{at} learning": [getattr(t, at) for t in tallies] for at in ("before", "after")}
+    return Bars(
+        f"The chosen order has the least effort: {words}",
+        "Tools on which the preference makes a difference (%)",
+        tuple(r.preference for r in found),
+        {at: np.array([100 * c / max(t.tools, 1) for c, t in zip(counts, tallies, strict=True)]) for at, counts in told.items()},
+        {at: tuple(f"{c} of {t.tools}" for c, t in zip(counts, tallies, strict=True)) for at, counts in told.items()},
+        f"One expert per preference, found in {min(asked)} to {max(asked)} answers about the training tools",
+        most=100,
+    )
 
 
 def _save(out: Path | None, name: str, value: Any) -> None:

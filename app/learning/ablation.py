@@ -40,6 +40,7 @@ class Ablation:
 
     seeds: int
     updates: int
+    tools: int
     bands: dict[str, dict[str, Band]]
 
 
@@ -78,7 +79,7 @@ def ablate(
     traces = {name: [_run(demonstrations, start, terms, parameters, updates) for start in starts] for name, terms in variants.items()}
     quantities = ("spread", "shift", "violations")
     bands = {name: {q: band(np.array([getattr(t, q) for t in found])) for q in quantities} for name, found in traces.items()}
-    return Ablation(seeds, updates, bands)
+    return Ablation(seeds, updates, len(demonstrations), bands)
 
 
 def band(runs: Array) -> Band:

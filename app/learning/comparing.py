@@ -5,7 +5,8 @@ equal weights, which the project page names, tool 7's is not); regret is measure
 known, so no regret. Made-up experts have weights drawn from an exponential distribution, on the synthetic tools.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from collections.abc import Sequence as Ordered
 from dataclasses import dataclass
 
 import numpy as np
@@ -238,15 +239,85 @@ def _line(learner: str, kind: str, found: list[Score]) -> Line:
     )
 
 
-def format_comparison(lines: list[Line]) -> str:
+def by_kind(lines: Ordered[Line]) -> list[list[Line]]:
+    """The lines of each kind, in the order met."""
+    return [[line for line in lines if line.kind == kind] for kind in dict.fromkeys(line.kind for line in lines)]
+
+
+def title_of(line: Line) -> str:
+    """Of the table a line stands in."""
+    return TITLES.get(line.kind, f"{line.cases} made-up experts of random weights, synthetic tools and split")
+
+
+def format_comparison(lines: Ordered[Line]) -> str:
     """A table per kind."""
     text: list[str] = []
-    for kind in dict.fromkeys(line.kind for line in lines):
-        rows = [line for line in lines if line.kind == kind]
-        title = TITLES.get(kind, f"{rows[0].cases} made-up experts of random weights, synthetic tools and split")
-        text += ["", title, "learner                  train   test    hits     regret    tau   answers    cpu s"]
+    for rows in by_kind(lines):
+        text += ["", title_of(rows[0]), "learner                  train   test    hits     regret    tau   answers    cpu s"]
         text += [_row(line) for line in rows]
-    return "\n".join(text[1:])
+        text += not_best(rows)
+    return "\n".join([*text[1:], MEANS])
+
+
+MEANS = (
+    'Answers and seconds are means per case. "Asking" is asked about the unseen tools themselves, Algorithm 1 about the training tools; '
+    "an order recorded because both that were shown are wrong counts as one more answer."
+)
+
+
+@dataclass(frozen=True)
+class _Measure:
+    """A column in which one learner can be better than another, and why ours may not be the best."""
+
+    name: str
+    of: Callable[[Line], float | None]
+    words: str  # format of a value
+    up: bool  # larger is better
+    why: str
+
+
+MEASURES = (
+    _Measure(
+        "training tools hit",
+        lambda x: x.train_success,
+        "{:.0%}",
+        True,
+        "a recorded order that contradicts the others is allowed to be an exception; copying an order says nothing about other tools",
+    ),
+    _Measure("unseen tools hit", lambda x: x.test_success, "{:.0%}", True, "without answers the demonstrations leave this open"),
+    _Measure("regret", lambda x: x.regret, "{:.2%}", False, "without answers the demonstrations leave this open"),
+    _Measure(
+        "tau",
+        lambda x: x.tau,
+        "{:.3f}",
+        True,
+        "tau counts from the one order that was recorded, but which of the equally cheap ones is chosen is settled by region names",
+    ),
+    _Measure(
+        "cpu",
+        lambda x: x.cpu_s,
+        "{:.2f} s",
+        False,
+        "ours proves its weights on every tool, or leaves each recorded order out in turn before it trusts a way of learning",
+    ),
+)
+
+
+def not_best(lines: Ordered[Line]) -> list[str]:
+    """Where another learner is ahead of ours without answers, and why; lines of one kind."""
+    ours = next((line for line in lines if line.learner == LEARNERS[0]), None)
+    if ours is None:
+        return []
+    found = []
+    for m in MEASURES:
+        others = [(value, x.learner) for x in lines if not x.learner.startswith("ours") and (value := m.of(x)) is not None]
+        mine = m.of(ours)
+        if mine is None or not others:
+            continue
+        best, who = max(others) if m.up else min(others)
+        if m.words.format(best) != m.words.format(mine) and (best > mine) is m.up:
+            found.append(f"Not best in {m.name}: {who} {m.words.format(best)}, ours {m.words.format(mine)}; {m.why}.")
+    return found
 
 
 def _row(line: Line) -> str:

@@ -40,13 +40,16 @@ def study_coverage(shown: dict[int, LearningDemonstration]) -> list[SubsetCovera
     return rows
 
 
+def subset_words(tools: tuple[int, ...]) -> str:
+    """'1 to 5' for tools without a gap, else '2, 3, 4, 6, 7'."""
+    whole = tools == tuple(range(tools[0], tools[-1] + 1))
+    return f"{tools[0]} to {tools[-1]}" if whole else ", ".join(map(str, tools))
+
+
 def format_coverage(rows: list[SubsetCoverage], kind: str) -> str:
     """The table as text."""
     lines = [f"Coverage of subsets of the authors' {kind} tools", "tools                     published   strict          shown at all"]
     for r in rows:
-        name = "{" + ", ".join(map(str, r.tools)) + "}"
-        name = "{1, ..., 10}" if len(r.tools) == 10 else name
-        lines.append(
-            f"{name:26s}{r.published:8.1f}    {r.strict:5.2f} ({r.captured:2d}/{r.possible})   {r.plain:5.2f} ({r.shown:2d}/{r.possible})"
-        )
+        strict, plain = (f"{share:5.2f} ({count:2d}/{r.possible})" for share, count in ((r.strict, r.captured), (r.plain, r.shown)))
+        lines.append(f"{subset_words(r.tools):26s}{r.published:8.1f}    {strict}   {plain}")
     return "\n".join([*lines, WHY])

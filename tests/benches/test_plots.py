@@ -5,7 +5,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from app.benches.plots import BOTTOM, HEIGHT, LEFT, Curve, Plot, as_svg, bars_as_svg, ticks
+from app.benches.plots import HEIGHT, LEFT, SOFT_INK, Bars, Curve, Plot, as_svg, bars_as_svg, ticks
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -38,11 +38,22 @@ def test_curve_band_and_words():
     assert {"Spread & shift", "Update", "Cost", "all <terms>"} <= set(words)
 
 
-def test_bars_are_as_tall_as_their_values():
-    root = ET.fromstring(bars_as_svg("Sides", "%", ("left", "right"), {"before": np.array([50.0, 0.0]), "after": np.array([100.0, 100.0])}))
-    bars = root.findall(f"{SVG}rect")[1:]
-    heights = [float(b.attrib["height"]) for b in bars]
-    assert heights[0] == pytest.approx(heights[2] / 2, abs=0.2)
-    assert heights[1] < 1
-    assert all(float(b.attrib["y"]) + float(b.attrib["height"]) == pytest.approx(HEIGHT - BOTTOM, abs=0.2) for b in bars)
-    assert {"left", "right", "before", "after"} <= {t.text for t in root.iter(f"{SVG}text")}
+def test_bars_are_as_long_as_their_values():
+    groups = {"before": np.array([50.0, 0.0]), "after": np.array([100.0, 100.0])}
+    words = {"before": ("1 of 2", "0 of 2"), "after": ("2 of 2", "2 of 2")}
+    root = ET.fromstring(bars_as_svg(Bars("Sides", "%", ("left", "few <changes>"), groups, words, most=100)))
+    bars = [r for r in root.findall(f"{SVG}rect")[1:] if r.attrib["x"] == root.findall(f"{SVG}rect")[1].attrib["x"]]
+    lengths = [float(b.attrib["width"]) for b in bars]  # before and after of the first label, then of the second
+    assert lengths[0] == pytest.approx(lengths[1] / 2, abs=0.2)
+    assert lengths[2] == 1
+    assert lengths[3] == lengths[1]
+    assert {"left", "few <changes>", "before", "after", "1 of 2", "0 of 2", "2 of 2", "100"} <= {t.text for t in root.iter(f"{SVG}text")}
+    height = float(root.attrib["height"])
+    assert all(0 < float(t.attrib["y"]) < height for t in root.iter(f"{SVG}text"))
+
+
+def test_a_high_curve_is_not_squeezed_under_an_axis_from_0():
+    x = np.arange(3.0)
+    near, far = (as_svg(Plot("", "", "", (Curve("a", x, y),))) for y in (np.array([0.9, 1.0, 1.1]), np.array([0.1, 1.0, 1.1])))
+    assert ">0</text>" not in near.replace(f'text-anchor="middle" fill="{SOFT_INK}">0</text>', "")
+    assert f'text-anchor="end" fill="{SOFT_INK}">0</text>' in far
