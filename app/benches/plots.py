@@ -14,6 +14,7 @@ DASHES = ("", "8 4", "2 4", "10 4 2 4", "5 3", "1 3")  # so that lines on top of
 FONT = "Inter, 'Segoe UI', system-ui, 'Helvetica Neue', 'Noto Sans', 'DejaVu Sans', sans-serif"
 WIDTH, HEIGHT = 640, 400
 LEFT, RIGHT, TOP, BOTTOM = 72, 148, 66, 54
+NAMES, END, THICK = 190, 84, 15  # bars: left of them, right of them, each with its gap
 TICKS = 5  # about
 FAR_FROM_0 = 0.5  # an axis starts at 0 unless the lowest value is above this share of the highest
 
@@ -75,33 +76,27 @@ def as_svg(plot: Plot) -> str:
 
 def bars_as_svg(bars: Bars) -> str:
     """The bars as a stand-alone SVG document, the first label on top."""
-    values = ticks(0.0, max(bars.most, *(float(v.max()) for v in bars.groups.values())))
-    margin, thick = 190, 24 / len(bars.groups) if len(bars.groups) > 1 else 18
-    step = thick * len(bars.groups) + 12
-    bottom = TOP + step * len(bars.labels)
-    legend = len(bars.groups) > 1
-    right = WIDTH - (118 if legend else 84)
-    scale = (right - margin) / values[-1]
+    count, scale_ticks = len(bars.groups), ticks(0.0, max(bars.most, *(float(v.max()) for v in bars.groups.values())))
+    top, step = TOP + (22 if count > 1 else 0), THICK * count + 12
+    bottom, scale = top + step * len(bars.labels), (WIDTH - NAMES - END) / scale_ticks[-1]
     parts = _opening(bars.title, bars.note, bottom + BOTTOM)
-    for value in values:
-        x = margin + value * scale
-        parts.append(f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{TOP}" y2="{bottom:.1f}" stroke="{AXIS if value == 0 else GRID}"/>')
-        parts.append(f'<text x="{x:.1f}" y="{bottom + 18:.1f}" text-anchor="middle" fill="{SOFT_INK}">{value:g}</text>')
-    parts.append(f'<text x="{(margin + right) / 2:.0f}" y="{bottom + 40:.1f}" text-anchor="middle">{escape(bars.label)}</text>')
+    for value in scale_ticks:
+        x = NAMES + value * scale
+        parts.append(f'<line x1="{x:.1f}" x2="{x:.1f}" y1="{top}" y2="{bottom}" stroke="{GRID if value else AXIS}"/>')
+        parts.append(f'<text x="{x:.1f}" y="{bottom + 18}" text-anchor="middle" fill="{SOFT_INK}">{value:g}</text>')
+    parts.append(f'<text x="{NAMES + (WIDTH - NAMES - END) / 2:.0f}" y="{bottom + 40}" text-anchor="middle">{escape(bars.label)}</text>')
+    for k, (name, values) in enumerate(bars.groups.items()):
+        colour = COLOURS[k % len(COLOURS)]
+        if count > 1:
+            parts.append(f'<rect x="{NAMES + 130 * k}" y="{TOP - 4}" width="12" height="12" fill="{colour}"/>')
+            parts.append(f'<text x="{NAMES + 130 * k + 18}" y="{TOP + 6}" font-size="12">{escape(name)}</text>')
+        for j, value in enumerate(values):
+            y, long = top + 6 + j * step + k * THICK, max(float(value) * scale, 1.0)
+            parts.append(f'<rect x="{NAMES}" y="{y}" width="{long:.1f}" height="{THICK - 2}" fill="{colour}"/>')
+            end = f'<text x="{NAMES + long + 6:.1f}" y="{y + THICK - 5}" font-size="12" fill="{SOFT_INK}">'
+            parts.append(f"{end}{escape(bars.words[name][j])}</text>")
     for j, label in enumerate(bars.labels):
-        top = TOP + j * step + 6
-        middle = top + thick * len(bars.groups) / 2
-        parts.append(f'<text x="{margin - 10}" y="{middle + 4.5:.1f}" text-anchor="end">{escape(label)}</text>')
-        for k, (name, given) in enumerate(bars.groups.items()):
-            y, long = top + k * thick, max(float(given[j]) * scale, 1.0)
-            size = f'width="{long:.1f}" height="{thick - 2:.1f}" fill="{COLOURS[k % len(COLOURS)]}"'
-            parts.append(f'<rect x="{margin}" y="{y:.1f}" {size}/>')
-            words = f'<text x="{margin + long + 6:.1f}" y="{y + thick / 2 + 3:.1f}" font-size="12" fill="{SOFT_INK}">'
-            parts.append(f"{words}{escape(bars.words[name][j])}</text>")
-    for k, name in enumerate(bars.groups if legend else ()):
-        y = TOP + 10 + 20 * k
-        parts.append(f'<rect x="{right + 34}" y="{y - 10}" width="12" height="12" fill="{COLOURS[k % len(COLOURS)]}"/>')
-        parts.append(f'<text x="{right + 51}" y="{y}" font-size="12">{escape(name)}</text>')
+        parts.append(f'<text x="{NAMES - 10}" y="{top + 8 + j * step + THICK * count / 2:.1f}" text-anchor="end">{escape(label)}</text>')
     return "\n".join([*parts, "</svg>"]) + "\n"
 
 

@@ -5,7 +5,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from app.benches.plots import HEIGHT, LEFT, SOFT_INK, Bars, Curve, Plot, as_svg, bars_as_svg, ticks
+from app.benches.plots import HEIGHT, LEFT, SOFT_INK, THICK, Bars, Curve, Plot, as_svg, bars_as_svg, ticks
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -42,11 +42,11 @@ def test_bars_are_as_long_as_their_values():
     groups = {"before": np.array([50.0, 0.0]), "after": np.array([100.0, 100.0])}
     words = {"before": ("1 of 2", "0 of 2"), "after": ("2 of 2", "2 of 2")}
     root = ET.fromstring(bars_as_svg(Bars("Sides", "%", ("left", "few <changes>"), groups, words, most=100)))
-    bars = [r for r in root.findall(f"{SVG}rect")[1:] if r.attrib["x"] == root.findall(f"{SVG}rect")[1].attrib["x"]]
-    lengths = [float(b.attrib["width"]) for b in bars]  # before and after of the first label, then of the second
-    assert lengths[0] == pytest.approx(lengths[1] / 2, abs=0.2)
-    assert lengths[2] == 1
-    assert lengths[3] == lengths[1]
+    bars = [r for r in root.findall(f"{SVG}rect") if r.attrib["height"] == str(THICK - 2)]
+    before, nothing, after, all_ = (float(b.attrib["width"]) for b in bars)
+    assert before == pytest.approx(after / 2, abs=0.2)
+    assert nothing == 1
+    assert all_ == after
     assert {"left", "few <changes>", "before", "after", "1 of 2", "0 of 2", "2 of 2", "100"} <= {t.text for t in root.iter(f"{SVG}text")}
     height = float(root.attrib["height"])
     assert all(0 < float(t.attrib["y"]) < height for t in root.iter(f"{SVG}text"))

@@ -4,7 +4,19 @@ import numpy as np
 import pytest
 
 from app.learning.baselines.learner import Learned, by_weights
-from app.learning.comparing import Case, Score, format_comparison, made_up_cases, score, summed
+from app.learning.comparing import (
+    ASKING,
+    LEARNERS,
+    Case,
+    Score,
+    format_comparison,
+    learners,
+    made_up_case,
+    made_up_cases,
+    not_best,
+    score,
+    summed,
+)
 from app.learning.generalising import learn_unasked
 from app.learning.performance_state import LearningDemonstration
 from app.sequencing.problem import problem_for
@@ -58,3 +70,42 @@ def test_agreeing_demonstrations_are_certified_and_contradicting_ones_are_not():
     assert found.certificate is None
     assert found.generalised is not None
     assert found.policy is found.generalised.policy
+
+
+def test_where_ours_is_not_best_is_said_with_its_reason():
+    def one(name: str, hits: int, tau: float, cpu: float) -> Score:
+        return Score(name, "made up", 6, 6, hits, 4, 0.1, tau, 0, cpu)
+
+    lines = summed(
+        [one("ours", 4, 0.8, 2.0), one("ours, always certified", 4, 0.9, 0.1), one("A", 3, 0.85, 1.0), one("random weights", 1, 0, 0)]
+    )
+    tau, cpu = not_best(lines)
+    assert tau.startswith("Not best in tau: A 0.850, ours 0.800; tau counts from the one order")
+    assert cpu.startswith("Not best in cpu: A 1.00 s, ours 2.00 s;")
+    assert tau in format_comparison(lines)
+    assert not_best(lines[1:]) == []
+
+
+def test_every_learner_is_compared_and_asking_leaves_no_tool_wrong():
+    """An expert who follows weights: the certified run's own questions make all unseen tools hits, and each answer is counted."""
+    problems = {s: problem_for(grid_graph(2, 3, s), ()) for s in range(1, 6)}
+    cases = [made_up_case(problems, (1,), k) for k in range(3)]
+    assert tuple(learners(cases[0], 0)) == LEARNERS
+    found = [score(ASKING, learners(case, 0)[ASKING], case, 0, lambda: 0.0) for case in cases]
+    plain = [score("ours", learners(case, 0)["ours"], case, 0, lambda: 0.0) for case in cases]
+    assert sum(s.test_hits for s in found) == 12
+    assert all(s.regret is not None and s.regret < 1e-9 for s in found)
+    assert sum(s.test_hits for s in plain) < 12
+    assert sum(s.answers for s in found) > sum(s.answers for s in plain) == 0
+
+
+def test_an_order_settled_by_questions_counts_as_all_orders_of_equal_features():
+    demo = shown(1)
+    case = Case("real", (demo,), (demo,), None)
+
+    def settling(orders: tuple[tuple[int, ...], ...]) -> Score:
+        return score("a", lambda *_: Learned(lambda p: orders[0], None, 2, {id(demo.problem): orders}), case, 0, lambda: 0.0)
+
+    other = demo.sequence[::-1]
+    assert (settling((other, demo.sequence)).test_hits, settling((other,)).test_hits) == (1, 0)
+    assert settling((other,)).answers == 2

@@ -193,11 +193,17 @@ def test_unknown_factor_is_refused(tools):
         coverage(tools, [], (Interaction("height", "colour"),))
 
 
-def test_p_value_of_a_cell_by_hand():
-    """Five equal steps in one cell: each factor tested with three levels there gives 3^-4; corrected for their number, judged at 0.05."""
+@pytest.mark.parametrize(
+    ("times", "alike"),  # probability of n steps all of one level among k, or of anything as uneven
+    [(5, {2: 2 * 2**-5.0, 3: 3 * 3**-5.0}), (20, {2: math.erfc(math.sqrt(10)), 3: math.exp(-20)})],
+    ids=["exact multinomial", "chi-squared"],
+)
+def test_p_value_of_a_cell_by_hand(times: int, alike: dict[int, float]):
+    """n equal steps in one cell: below 15 each factor with k levels there gives k^(1 - n); above, chi-squared n (k - 1) with k - 1
+    degrees of freedom. Corrected for the number of factors tested, judged at 0.05."""
     tool = problem_for(grid_graph(3, 3, 2))
     order = tuple(range(9))
-    report = coverage([tool], [(0, order)] * 5, DEFAULT_INTERACTIONS)
+    report = coverage([tool], [(0, order)] * times, DEFAULT_INTERACTIONS)
     sampled = sample_transitions(tool)
     levels = report.thresholds
     grid, shown = levels.of(sampled.values), levels.of(sequence_values(tool, order))
@@ -212,8 +218,8 @@ def test_p_value_of_a_cell_by_hand():
                 continue
             there = grid[(grid[:, axes[0]] == row) & (grid[:, axes[1]] == column)]
             kinds = [len({*there[:, f].tolist(), int(inside[0, f])}) for f in tested if f not in axes]
-            tests = [k * k**-5.0 for k in kinds if k > 1]
-            assert cell.count == 5
+            tests = [alike[k] for k in kinds if k > 1]
+            assert cell.count == times
             assert cell.p_value == pytest.approx(min(1.0, min(tests) * len(tests)))
             assert cell.state == ("captured" if cell.p_value >= 0.05 else "uneven")
             checked += 1

@@ -1,5 +1,7 @@
 """Eq. 7: value by hand, subgradient against finite differences, exact minimiser against random points."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -49,6 +51,22 @@ def test_gradient_is_the_slope_of_the_loss(seed: int):
             - performance_loss(down, demo, samples, cheapest(down, demo, cuts), TERMS).total
         )
         assert gradient[k] == pytest.approx(rise / (2 * step), abs=1e-5)
+
+
+@pytest.mark.parametrize("term", ["alpha", "beta", "gamma", "regularisation"])
+def test_gradient_of_each_term_alone(term: str):
+    """Each factor's part of Eq. 7 by itself, so that two wrong parts can't make up for each other; and it is no zero."""
+    only = replace(LossTerms(0.0, 0.0, 0.0, 0.0), **{term: 1.3})
+    for seed in range(10):
+        rng, demo, samples, cuts = instance(seed)
+        w, step = rng.uniform(0.5, 1.5, 4), 1e-6
+        gradient = performance_gradient(w, demo, samples, cheapest(w, demo, cuts), only)
+        values = [
+            [getattr(performance_loss(x, demo, samples, cheapest(x, demo, cuts), only), term) for x in (w + d, w - d)]
+            for d in step * np.eye(4)
+        ]
+        assert gradient == pytest.approx([(up - down) / (2 * step) for up, down in values], abs=1e-5)
+        assert term == "gamma" or np.abs(gradient).max() > 0.01  # a demonstration may already be the cheapest
 
 
 @given(st.integers(0, 200))

@@ -4,8 +4,13 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
+from app.learning import certified, loss
+from app.learning.baselines import margin_planning
 from app.learning.effort import EffortParameters, _Answered, _fit
+from app.learning.expert import ScriptedExpert
+from app.learning.performance_state import LearningDemonstration
 from app.learning.qp import QuadraticProgram, solve
+from tests.learning.made_up import TRUE_WEIGHTS, demonstrations, problems
 
 
 def residual(program: QuadraticProgram, x: np.ndarray) -> float:
@@ -40,3 +45,31 @@ def test_effort_weights_are_the_minimiser_of_eq_8(seed):
     multipliers, left = nnls(columns, pull)
     assert left < 1e-4 * max(1.0, float(np.linalg.norm(pull)))
     assert (multipliers[: met.sum()] <= 1 + 1e-4).all()
+
+
+@pytest.mark.parametrize("of", [loss, certified, margin_planning], ids=["Eq. 7", "least slack", "margin planning"])
+def test_programs_of_the_learners_are_solved_to_their_conditions(of, monkeypatch: pytest.MonkeyPatch):
+    """Each program a learner poses: feasible, stationary with multipliers >= 0 on the rows that hold, and not so elsewhere."""
+    posed: list[tuple[QuadraticProgram, np.ndarray]] = []
+
+    def watched(program: QuadraticProgram) -> np.ndarray:
+        posed.append((program, solve(program)))
+        return posed[-1][1]
+
+    monkeypatch.setattr(of, "solve", watched)
+    demos = demonstrations(ScriptedExpert(TRUE_WEIGHTS, None), problems(3))
+    reverse = LearningDemonstration(demos[0].problem, demos[0].sequence[::-1])
+    if of is loss:
+        rng = np.random.default_rng(0)
+        demo, samples = rng.uniform(0, 2, (3, 4)), [rng.uniform(0, 3, (k, 4)) for k in (2, 5, 3)]
+        loss.minimise_loss(demo, samples, [[x] for x in rng.uniform(0, 3, (3, 4))], loss.LossTerms(0.3, 0.7, 5.0, 0.2), np.full(4, 0.05))
+    elif of is certified:
+        certified.certify([reverse, *demos])
+    else:
+        margin_planning.plan_by_margin([reverse, *demos], np.random.default_rng(0))
+    assert posed
+    for program, x in posed:
+        assert (program.rows @ x <= program.limits + 1e-7).all()
+        assert residual(program, x) < 1e-5 * max(1.0, float(np.abs(program.slope).max()))
+    program, x = posed[-1]
+    assert residual(program, 0.9 * x + 0.01) > 1e-3
