@@ -16,6 +16,7 @@ from app.learning.evaluation import StudyReport
 
 REPORT = "report.json"
 Cell = str | int | float | None
+WHAT = "Training and unseen: share of the tools on which the expert's order is chosen; tau: its agreement with the order chosen there."
 
 
 @dataclass(frozen=True)
@@ -49,18 +50,18 @@ def save_report(
 
 def comparison_tables(lines: Sequence[Line]) -> list[Table]:
     """One table per kind of tools."""
-    columns = ("Learner", "Training tools hit", "Unseen tools hit", "Hits", "Extra cost", "Agreement (tau)", "Answers", "CPU seconds")
+    columns = ("Learner", "Training", "Unseen", "Hits", "Extra cost", "Tau", "Answers", "CPU (s)")
     tables = []
     for found in by_kind(lines):
         rows = tuple(
             (
                 *(line.learner, f"{line.train_success:.0%}", f"{line.test_success:.0%}", f"{line.test_hits}/{line.test}"),
                 "-" if line.regret is None else f"{line.regret:.2%}",
-                *(round(line.tau, 2), round(line.answers, 1), round(line.cpu_s, 2)),
+                *(f"{line.tau:.2f}", f"{line.answers:.1f}", f"{line.cpu_s:.2f}"),
             )
             for line in found
         )
-        tables.append(Table(title_of(found[0]), columns, rows, " ".join([MEANS, *not_best(found)])))
+        tables.append(Table(title_of(found[0]), columns, rows, " ".join([WHAT, MEANS, *not_best(found)])))
     return tables
 
 
@@ -79,7 +80,10 @@ def _interval(mean: float, low: float, high: float) -> str:
 def coverage_table(rows: Sequence[SubsetCoverage], kind: str) -> Table:
     """Table I beside ours."""
     columns = ("Tools", "Published", "Strict rule", "Shown at all", "Captured", "Shown", "Possible")
-    body = tuple((subset_words(r.tools), r.published, round(r.strict, 2), round(r.plain, 2), r.captured, r.shown, r.possible) for r in rows)
+    body = tuple(
+        (subset_words(r.tools), *(f"{share:.2f}" for share in (r.published, r.strict, r.plain)), r.captured, r.shown, r.possible)
+        for r in rows
+    )
     return Table(f"Coverage of subsets of the authors' {kind} tools (Table I)", columns, body, WHY)
 
 

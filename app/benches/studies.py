@@ -69,7 +69,8 @@ def comparison_bars(lines: list[Line]) -> Bars:
     shares = {"hit": np.array([100 * line.test_success for line in lines])}
     words = {"hit": tuple(f"{line.test_hits} of {line.test}" for line in lines)}
     names = tuple(line.learner for line in lines)
-    return Bars(title_of(lines[0]), "Unseen tools on which the expert's order is chosen (%)", names, shares, words, most=100)
+    note = "Each learner saw the same recorded orders on other tools; only those that ask got answers"
+    return Bars(title_of(lines[0]), "Unseen tools on which the expert's order is chosen (%)", names, shares, words, note, 100)
 
 
 def _all_learners(cases: list[Case], seed: int) -> Iterator[Score]:

@@ -50,7 +50,7 @@ def test_every_saved_study_has_a_report(tmp_path: Path):
     report = json.loads((tmp_path / "c" / "report.json").read_text())
     assert report["command"].startswith("./dev study coverage --data ")
     assert report["command"].endswith(f"--out {tmp_path / 'c'}")
-    assert [row[1] for row in report["tables"][0]["rows"]] == [1.0, 0.9, 0.5, 0.4]
+    assert [row[1] for row in report["tables"][0]["rows"]] == ["1.00", "0.90", "0.50", "0.40"]
     run("real", "--out", str(tmp_path / "r"))
     short, tools = json.loads((tmp_path / "r" / "report.json").read_text())["tables"]
     assert [row[0] for row in tools["rows"]] == list(range(1, 11))
