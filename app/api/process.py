@@ -17,6 +17,14 @@ Key = Annotated[str, Field(min_length=1, max_length=60)]
 Keys = Annotated[list[Key], Field(max_length=100)]
 Why = Annotated[str, Field(max_length=600, description="A sentence that tells the next engineer why.")]
 Levels = Literal["quantile", "range"]
+FiniteNumber = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class LevelsByHand(Body):
+    """What was set on the coverage page, by feature; others have the usual rule."""
+
+    chosen: Annotated[dict[Key, Levels], Field(default_factory=dict, max_length=60)]
+    expert: Annotated[dict[Key, tuple[FiniteNumber, FiniteNumber]], Field(default_factory=dict, max_length=60)]
 
 
 class ProcessChanges(Body):
@@ -27,6 +35,9 @@ class ProcessChanges(Body):
     own: Annotated[Keys, Field(description="Own features switched on, by KEY.")] | None = None
     interactions: Annotated[list[InteractionChoice], Field(max_length=20)] | None = None
     levels: Annotated[Levels, Field(description="Thirds of the values at hand, or of their range.")] | None = None
+    by_hand: (
+        Annotated[LevelsByHand, Field(description="In place of all levels set by hand; starting from a template drops them.")] | None
+    ) = None
 
 
 class NewTemplate(Body):
@@ -76,6 +87,7 @@ class Process(Row):
     own: list[OwnFeature]
     own_folder: str
     levels: Levels
+    by_hand: LevelsByHand
     interactions: list[NamedInteraction]
 
 

@@ -54,7 +54,8 @@ class ExpertQuery(Row):
     right: Side
     difference: str
     why: str
-    differs: list[int]
+    differs: list[int]  # regions at another step
+    marked: list[int]  # where to look: these, or where most differ those that `difference` names
     number: int
     of: int
     choices: list[Choice]

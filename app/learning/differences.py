@@ -52,6 +52,16 @@ def describe_difference(names: Ordered[str], descriptions: Ordered[str], left: S
     return f"{before}; {after}{end}. {_moved(len(differs), len(left))}"
 
 
+def regions_to_mark(left: Sequence, right: Sequence) -> tuple[int, ...]:
+    """Where to look: the regions at another step, or where these are more than half of all only those that the sentence names."""
+    differs = differing_regions(left, right)
+    if 2 * len(differs) <= len(left):
+        return differs
+    step = next(k for k in range(len(left)) if left[k] != right[k])
+    ends = (right[-1],) if left[-1] != right[-1] else ()
+    return tuple(dict.fromkeys((left[step], right[step], *ends)))
+
+
 def _called(name: str, description: str) -> str:
     words = description.strip()
     if not words or words.lower() == name.lower():
@@ -61,4 +71,4 @@ def _called(name: str, description: str) -> str:
 
 
 def _moved(differing: int, total: int) -> str:
-    return f"{differing} of {total} regions come at another step."
+    return f"{'All' if differing == total else f'{differing} of'} {total} regions come at another step."

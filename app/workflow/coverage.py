@@ -72,7 +72,7 @@ def set_levels(ctx: Context, project_id: str, feature: str, rule: str | None, th
         chosen = {k: v for k, v in project.levels.get("chosen", {}).items() if k != feature}
         expert = {k: v for k, v in project.levels.get("expert", {}).items() if k != feature}
         if rule == "expert":
-            expert[feature] = _checked_thresholds(thresholds)
+            expert[feature] = checked_thresholds(thresholds)
         elif rule is not None:
             chosen[feature] = rule
         project.levels = {**project.levels, "chosen": chosen, "expert": expert}
@@ -83,7 +83,7 @@ def set_levels(ctx: Context, project_id: str, feature: str, rule: str | None, th
     return get_coverage(ctx, project_id)
 
 
-def _checked_thresholds(thresholds: tuple[float, float] | None) -> list[float]:
+def checked_thresholds(thresholds: tuple[float, float] | None) -> list[float]:
     if thresholds is None:
         raise InvalidInput("Thresholds of your own need two numbers: up to which value is small, and above which large.")
     low, high = thresholds

@@ -16,11 +16,14 @@ from app.storage.identity import now
 from app.storage.process_tables import OwnFeatureRow, ProcessTemplateRow
 from app.storage.tables import Project
 from app.workflow.context import Context
+from app.workflow.coverage import checked_thresholds
 from app.workflow.feature_choice import FOLDER, base_set, examined, own_features, own_files, project_features
 from app.workflow.lookup import check_version, current_segmentation, found, present, refuse_while_training, tools_of
 from app.workflow.project_rows import checked_interactions, checked_name, labelled, touch
 
 Json = dict[str, Any]
+
+BY_HAND = ("chosen", "expert")  # levels set for single features
 
 
 def get_process(ctx: Context, project_id: str) -> Json:
@@ -35,7 +38,7 @@ def set_process(ctx: Context, project_id: str, changes: Json, version: int | Non
         ctx: Where.
         project_id: Which.
         changes: Any of `template` (key or id), `without` (factors), `own` (keys of files in the folder), `levels` ("quantile" | "range"),
-            `interactions` (pairs of factors).
+            `by_hand` (levels of single features, as `get_process` gave them), `interactions` (pairs of factors).
         version: The version the caller has seen.
 
     Raises:
@@ -56,6 +59,8 @@ def set_process(ctx: Context, project_id: str, changes: Json, version: int | Non
             project.own = _switched_on(ctx, session, project, changes["own"])
         if changes.get("levels") is not None:
             project.levels = {**project.levels, "default": changes["levels"]}
+        if changes.get("by_hand") is not None:
+            project.levels = {"default": project.levels.get("default", "quantile"), **_checked_levels(session, project, changes["by_hand"])}
         chosen = project_features(session, project.id)  # refuses an empty or ambiguous choice
         if changes.get("interactions") is not None:
             project.interactions = checked_interactions(chosen, changes["interactions"])
@@ -81,6 +86,7 @@ def process_json(ctx: Context, session: Session, project: Project) -> Json:
         "own": _own_json(ctx, session, project),
         "own_folder": FOLDER,
         "levels": project.levels.get("default", "quantile"),
+        "by_hand": {key: project.levels.get(key, {}) for key in BY_HAND},
         "interactions": labelled(project.interactions, chosen),
     }
 
@@ -170,6 +176,15 @@ def _checked(session: Session, project: Project, without: list[str]) -> list[str
     base = FEATURE_SETS[base_set(session, project.id)]
     chosen_features(base, without)  # refuses unknown ones and an empty choice
     return sorted(set(without))
+
+
+def _checked_levels(session: Session, project: Project, by_hand: Json) -> Json:
+    """Levels of single features; one that is switched off now keeps its own until it counts again."""
+    known = {*FEATURE_SETS[base_set(session, project.id)].factors, *project_features(session, project.id).factors}
+    unknown = {key for kind in BY_HAND for key in by_hand[kind]} - known
+    if unknown:
+        raise UnknownFeature(f"There is no feature {min(unknown)!r} to set levels of. Known are: {', '.join(sorted(known))}.")
+    return {"chosen": by_hand["chosen"], "expert": {key: checked_thresholds(tuple(pair)) for key, pair in by_hand["expert"].items()}}
 
 
 def _switched_on(ctx: Context, session: Session, project: Project, keys: list[str]) -> list[str]:

@@ -6,6 +6,7 @@ from sqlmodel import Session, col, delete, select
 
 from app.errors import AlreadyAnswered, Conflict, InvalidInput
 from app.jobs.rows import cancel_jobs
+from app.learning.differences import regions_to_mark
 from app.storage import emit
 from app.storage.tables import ACTIVE_RUN_STATES, Answer, Demonstration, Metric, Project, Query, Run, RunCheckpoint, ToolRow
 from app.workflow.context import Context
@@ -51,7 +52,7 @@ CHOICES["closer"] = [
 ]
 SIDES = {
     "similarity": (("Yours", "{name}, recorded"), ("Other", "by what is learned so far at least as good")),
-    "preference": (("Left", "as good as the other"), ("Right", "as good as the other")),
+    "preference": (("Left", "both are equally good"), ("Right", "both are equally good")),
     "closer": (("Left", "one way to do it"), ("Right", "another way")),
     "pair": (("Left", "{who} recorded this tool"), ("Right", "{who} recorded this tool")),
 }
@@ -180,6 +181,7 @@ def query_json(session: Session, row: Query) -> Json:
         "difference": row.difference,
         "why": row.why,
         "differs": row.differs,
+        "marked": list(regions_to_mark(tuple(row.left), tuple(row.right))),
         "number": row.number,
         "of": max(len(together), row.number),
         "choices": CHOICES[row.kind],

@@ -150,7 +150,7 @@ def _drawn(ctx: Context, session: Session, query: Json) -> Json:
 
     def side(which: str) -> Json:
         order, label = query[which]["sequence"], query[which]["label"]
-        names = [(tool.regions[a].name, a in query["differs"]) for a in order]
-        return {**query[which], "names": names, "svg": picture(tool, order, query["differs"], f"{query['tool_name']}, order {label}")}
+        names = [(tool.regions[a].name, a in query["marked"]) for a in order]
+        return {**query[which], "names": names, "svg": picture(tool, order, query["marked"], f"{query['tool_name']}, order {label}")}
 
     return {**query, "left": side("left"), "right": side("right")}

@@ -51,7 +51,7 @@ def begin(session: Session, job: JobRow) -> None:
     """The run trains from here on."""
     row = session.get(Run, job.subject_id)
     if row is not None and row.state == "queued":
-        go(session, row, "training")
+        go(session, row, "training", "Comparing your orders with others.")
 
 
 def prepare(values: Values, session: Session, job: JobRow) -> Step | None:
@@ -184,7 +184,7 @@ def _new_query(values: Values, session: Session, row: Run, shown: list[Demonstra
     tool = values.tool(session, cut)
     names, descriptions = [r.name for r in tool.regions], [r.description for r in tool.regions]
     kind = _question_kind(row, demonstration)
-    words = describe_difference(names, descriptions, asked.left, asked.right, *([PAIR] if demonstration is None else []))
+    words = describe_difference(names, descriptions, asked.left, asked.right, *([] if kind == "similarity" else [PAIR]))
     return Query(
         run_id=row.id,
         project_id=row.project_id,

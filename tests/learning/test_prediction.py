@@ -78,7 +78,7 @@ NAMES, DESCRIPTIONS = ("A", "B", "C", "D"), ("Floor", "Left wall", "", "Rim")
         (
             (0, 1, 2, 3),
             (2, 0, 3, 1),
-            "Yours does A (floor) before C; the other starts with C and ends with B (left wall). 4 of 4 regions come at another step.",
+            "Yours does A (floor) before C; the other starts with C and ends with B (left wall). All 4 regions come at another step.",
         ),
         (
             (0, 1, 2, 3),

@@ -134,6 +134,18 @@ def test_thresholds_of_ones_own_change_the_report_and_outlive_a_switched_off_fea
     process.set_process(ctx, project["id"], {"without": []})
     assert height(coverage.get_coverage(ctx, project["id"]))["rule"] == "expert"
     assert height(coverage.set_levels(ctx, project["id"], "height", "range"))["rule"] == "range"
+    before = process.get_process(ctx, project["id"])
+    process.set_process(ctx, project["id"], {"template": "spraying"})
+    assert height(coverage.get_coverage(ctx, project["id"]))["rule"] == "range"  # the usual one of spraying
+    assert process.get_process(ctx, project["id"])["by_hand"] == {"chosen": {}, "expert": {}}
+    undone = process.set_process(
+        ctx, project["id"], {"template": before["template"], "levels": before["levels"], "by_hand": before["by_hand"]}
+    )
+    assert undone["by_hand"] == before["by_hand"] == {"chosen": {"height": "range"}, "expert": {}}
+    process.set_process(ctx, project["id"], {"by_hand": {"chosen": {}, "expert": {"height": (5.0, 6.0)}}})
+    assert height(coverage.get_coverage(ctx, project["id"]))["rule"] == "expert"
+    with pytest.raises(UnknownFeature, match="no feature 'colour'"):
+        process.set_process(ctx, project["id"], {"by_hand": {"chosen": {"colour": "range"}, "expert": {}}})
     reset = height(coverage.set_levels(ctx, project["id"], "height", None))
     assert {**reset, "suspected": True} == height(usual)  # the interactions went with the feature
     with pytest.raises(InvalidInput, match="smaller one first"):

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from app.errors import InvalidInput, NotFound
+from app.learning.differences import regions_to_mark
 from app.workflow import runs, tools
 from app.workflow.context import Context
 from app.workflow.question_files import harmless, questions_csv, questions_page, read_answers
@@ -49,7 +50,7 @@ def test_the_page_shows_both_orders_of_every_question(sample: Context) -> None:
         assert picture.count("<path") >= count
         inside = [(float(x), float(y)) for x, y in re.findall(r'cx="([\d.-]+)" cy="([\d.-]+)"', picture)]
         assert all(0 < x < 360 and 0 < y < 240 for x, y in inside)
-    assert pictures[0].count("#b3261e") == len(asked[0]["differs"])
+    assert pictures[0].count("#b3261e") == len(asked[0]["marked"])
     assert page.count("<li><i></i>") == 5 * len(asked)
     assert "A &lt;b&gt; &amp; mould" in page
     assert name not in page
@@ -143,3 +144,10 @@ def test_an_unknown_run(sample: Context) -> None:
 def test_names_are_no_formulas() -> None:
     assert harmless("=1+1") == "'=1+1"
     assert harmless("Trough 07") == "Trough 07"
+
+
+def test_only_what_the_sentence_names_is_marked_where_most_regions_differ() -> None:
+    assert regions_to_mark((0, 1, 2, 3, 4), (0, 2, 1, 3, 4)) == (1, 2)
+    assert regions_to_mark((0, 1, 2, 3, 4), (4, 3, 2, 1, 0)) == (0, 4)
+    assert regions_to_mark((0, 1, 2, 3, 4), (1, 2, 3, 4, 0)) == (0, 1)
+    assert regions_to_mark((0, 1, 2, 3, 4), (3, 0, 1, 4, 2)) == (0, 3, 2)

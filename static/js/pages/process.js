@@ -28,13 +28,13 @@ async function change(changes, words) {
   }
 }
 
-// Undo of any change: what was switched before, and the interactions that went with it.
+// Undo of any change: what was switched before, and the interactions and levels that went with it.
 async function put(before) {
   try {
     const off = before.features.filter((feature) => !feature.on).map((feature) => feature.key);
     const own = before.own.filter((feature) => feature.on && feature.file).map((feature) => feature.key);
     const template = before.template === state.process.template ? {} : { template: before.template };
-    show(await patch(`/projects/${shell.projectId}/process`, { ...template, without: off, own, levels: before.levels, interactions: before.interactions.map(({ first, second }) => ({ first, second })) }, state.process.version));
+    show(await patch(`/projects/${shell.projectId}/process`, { ...template, without: off, own, levels: before.levels, by_hand: before.by_hand, interactions: before.interactions.map(({ first, second }) => ({ first, second })) }, state.process.version));
   } catch (error) {
     complain(error);
   }

@@ -11,6 +11,9 @@ import { QuestionFile } from "./teach-file.js";
 const WIDE = "(min-width: 1100px)";
 const MOST_TICKS = 24;
 
+// A note that holds for both orders stands beside the tool's name, so that it covers nothing.
+const sharedNote = ({ left, right }) => left.note === right.note;
+
 export class QuestionView {
   constructor({ projectId, regionsOf, onAnswer, onUndo, canUndo, onFile }) {
     this.projectId = projectId;
@@ -103,7 +106,7 @@ export class QuestionView {
     const [answered, of] = [query.number - 1, Math.max(query.of, query.number)];
     const more = of - query.number;
     const ticks = of <= MOST_TICKS ? h("span.steps", { role: "img", "aria-label": `${answered} answered, ${more + 1} left` }, Array.from({ length: of }, (_, i) => h(`i${i < answered ? ".done" : i === answered ? ".now" : ""}`))) : null;
-    fill(this.top, h("div.question", { "aria-live": "polite" }, h("h1#question-title", {}, query.title), h("p.muted", {}, query.difference)),
+    fill(this.top, h("div.question", { "aria-live": "polite" }, h("h1#question-title", {}, query.title), h("p.muted", {}, h("b.strong", {}, sharedNote(query) ? `${query.tool_name}, ${query.left.note}` : query.tool_name), ". ", query.difference)),
       h("div.count", {}, h("span.num", {}, `Question ${query.number}${more ? `, ${more} more` : ", the last for now"}`), ticks));
     this.answers.style.setProperty("--columns", ["1fr", "1fr", ...query.choices.slice(2).map(() => "auto")].join(" "));
     fill(this.answers, query.choices.map((choice) => h(`button.answer${["cant_tell", "equal", "both_wrong"].includes(choice.value) ? ".quiet" : ""}`, { type: "button", dataset: { key: `answer-${choice.value}`, value: choice.value }, onclick: () => this.answer(choice) },
@@ -117,15 +120,16 @@ export class QuestionView {
     const regions = this.regionsOf(query.tool_id);
     const step = this.stepper.step;
     const wide = this.wide.matches;
+    const few = query.marked.length === query.differs.length; // the rest stays in the background; else only what the sentence names is outlined
     for (const side of Object.values(this.sides)) {
       const entry = query[side.which];
-      fill(side.letters, strip(entry.sequence, regions, { step, differs: query.differs }));
+      fill(side.letters, strip(entry.sequence, regions, { step, ...(few ? { differs: query.marked } : { named: query.marked }) }));
       const shown = wide ? entry : query[this.chosen];
       side.label.textContent = shown.label;
-      side.note.textContent = shown.note;
+      side.note.textContent = sharedNote(query) ? "" : shown.note;
       if (!wide && side.which === "right") continue;
       const names = query.differs.map((id) => regions[id]?.name ?? id).join(", ");
-      side.view?.show({ mode: "sequence", tool_id: query.tool_id, sequence: shown.sequence, step: step === this.stepper.n ? null : step, differs: query.differs }, `${query.tool_name}, order “${shown.label}”, ${step === this.stepper.n ? "complete" : `after step ${step}`}; ${names} differ`);
+      side.view?.show({ mode: "sequence", tool_id: query.tool_id, sequence: shown.sequence, step: step === this.stepper.n ? null : step, ...(few ? { differs: query.marked } : { highlight: query.marked }) }, `${query.tool_name}, order “${shown.label}”, ${step === this.stepper.n ? "complete" : `after step ${step}`}; ${names} differ`);
     }
     if (!wide) {
       fill(this.switch, ["left", "right"].map((which) => h("button", { type: "button", "aria-pressed": String(this.chosen === which), dataset: { key: `side-${which}` }, onclick: () => this.choose(which) }, query[which].label)));

@@ -121,6 +121,11 @@ function outcomeActions(run, project, act, tools) {
   return [];
 }
 
+// Orders that differ by less than anybody would notice count as settled too.
+export function settled({ extra }) {
+  return extra < 1e-7 ? "settled" : h("span", { dataset: { tip: `Another order may be better, by ${number(100 * extra, 2)} % of the cost at most: too little to ask about` } }, "good enough");
+}
+
 const percent = (share) => `${Math.round(100 * share)} %`;
 
 // How sure the choice is on each tool nobody has recorded, and on which demonstrations the weights fall short.
@@ -129,10 +134,10 @@ function chances(report, project) {
   const odd = report.demonstrations.filter((entry) => entry.slack > 1e-7);
   const row = (tool) => h("tr", {}, h("td", {}, tool.tool_name), h("td.num", { dataset: { tip: "Share of the weights that agree with all you said under which the chosen order is among the cheapest" } }, percent(tool.probability)),
     h("td.num", { dataset: { tip: "How much more the chosen order could cost than the best one, under any of these weights" } }, tool.extra < 1e-7 ? "nothing" : `${number(100 * tool.extra, 2)} %`),
-    h("td", {}, tool.agreed ? "settled" : h("a", { href: pageAddress(project.id, "record", { tool: tool.tool_id }) }, "record it")));
+    h("td", {}, tool.agreed ? settled(tool) : h("a", { href: pageAddress(project.id, "record", { tool: tool.tool_id }) }, "record it")));
   const exclude = (report.conflicts ?? []).map((conflict) => h("li", {}, conflict.tools.map((entry, i) => [i ? ", " : "", h("a", { href: pageAddress(project.id, "record", { tool: entry.tool_id }) }, entry.tool_name), h("span.muted", { dataset: { tip: "How much dearer its order is when the others are explained" } }, ` (${number(100 * entry.slack, 2)} %)`)]), ` exclude each other; without any one of them the rest fits. ${conflict.resolved}`));
   return [exclude.length ? h("ul", {}, exclude) : null, odd.length ? h("p", {}, "Under the weights found: ", odd.map((entry, i) => [i ? ", " : "", h("a", { href: pageAddress(project.id, "record", { tool: entry.tool_id }) }, entry.tool_name), ` costs ${number(100 * entry.slack, 2)} % more than its cheapest order`]), ".") : null,
-    report.tools.length ? h("details.drawer", { open: true, style: { width: "100%" } }, h("summary", { style: { padding: "0" } }, icon("right", "caret"), h("h2", {}, "Tools nobody has recorded"), h("span", {}, `expect ${number(report.expected_wrong, 2)} of ${report.tools.length} wrong`)),
+    report.tools.length ? h("details.drawer", { open: true, style: { width: "100%" } }, h("summary", { style: { padding: "0" } }, icon("right", "caret"), h("h2", {}, "Tools nobody has recorded"), h("span", {}, `about ${number(report.expected_wrong, 2)} of ${report.tools.length} may have a better order`)),
       h("table.run-list", {}, h("thead", {}, h("tr", {}, h("th", {}, "Tool"), h("th.num", {}, "Order is right"), h("th.num", {}, "At worst dearer by"), h("th", {}, ""))), h("tbody", {}, report.tools.map(row)))) : null];
 }
 

@@ -14,7 +14,7 @@ const TERMS = [
 ];
 
 const OPEN_TERMS = [
-  { key: "open", name: "tools expected wrong", colour: "var(--c-1)", symbol: "sum over the tools nobody has recorded of the probability that the chosen order is not the best" },
+  { key: "open", name: "tools that may be wrong", colour: "var(--c-1)", symbol: "sum over the tools nobody has recorded of the probability that the chosen order is not the best" },
   { key: "slack", name: "slack", colour: "var(--c-2)", symbol: "how much the recorded orders cost above the cheapest, relative" },
 ];
 const termsOf = (run) => (run?.mode === "certified" ? OPEN_TERMS : TERMS);
@@ -26,6 +26,12 @@ const NOTES = {
 const KEY_FACTS = 4;
 
 export const explained = (violations) => (violations === 0 ? "every demonstration explained" : `${plural(violations, "demonstration")} not yet explained`);
+
+function openWords({ terms }) {
+  if (terms.open < 0.05) return "no tool left open";
+  const count = number(terms.open, 2);
+  return `about ${count} ${count === "1" ? "tool" : "tools"} may get a wrong order`;
+}
 
 const shown = (value) => (typeof value === "boolean" ? (value ? "yes" : "no") : number(value));
 
@@ -54,7 +60,7 @@ export class Training {
     if (run.id !== this.runId) this.items = [];
     this.runId = run.id;
     this.run = run;
-    const facts = run.kind === "performance" ? [run.iteration ? `step ${run.iteration}` : null, run.loss === null ? null : run.mode === "certified" ? `${number(run.loss, 2)} tools expected wrong` : `loss ${number(run.loss)}`, run.violations === null ? null : explained(run.violations)] : [`round ${run.round}`, plural(run.answered, "answer")];
+    const facts = run.kind === "performance" ? [run.iteration ? `step ${run.iteration}` : null, run.loss === null ? null : run.mode === "certified" ? openWords(run) : `loss ${number(run.loss)}`, run.violations === null ? null : explained(run.violations)] : [`round ${run.round}`, plural(run.answered, "answer")];
     fill(this.legend, termsOf(run).map((term) => h("span", { dataset: { tip: term.symbol } }, h("i.stroke", { style: { "--swatch": term.colour } }), term.name)));
     fill(this.facts, facts.filter(Boolean).map((text) => h("span", {}, text)));
     const words = { queued: "about to start", training: "learning", waiting_for_expert: "paused until you answer", cancelling: "stopping" };
