@@ -10,6 +10,7 @@ that both are equally far from it, or nothing. Closer means: fewer pairs of regi
 """
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -17,13 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.learning.generalising import Generalised, on_features
-from app.learning.many_optima import sums_of
+from app.learning.many_optima import Orders, sums_of
+from app.learning.maximum_entropy import check_size, unit_of
 from app.learning.qp import Array
+from app.learning.soft_graph import cheapest_in, drawn_from, part_graph, to_go_of
 from app.learning.soft_program import drawn, soft_to_go
 from app.sequencing.constraints import resolve
 from app.sequencing.features import FEATURE_SETS
 from app.sequencing.omega import equal_sums
-from app.sequencing.problem import SequencingProblem
+from app.sequencing.problem import TENSOR_LIMIT, SequencingProblem
 
 DRAWS = (200, 30)  # weights from the posterior, orders from each
 BOLDNESS = 1.5  # temperature: an expert makes bolder exceptions than the demonstrations' likelihood has room for
@@ -57,14 +60,18 @@ def candidates_for(problem: SequencingProblem, learned: Generalised, generator: 
     """Candidates and how probable they are before any answer.
 
     Args:
-        problem: The tool, under any features; at most 14 regions.
+        problem: The tool, under any features. Above 14 regions orders are drawn from the likeliest sets only (`soft_graph`).
         learned: From the demonstrations of other tools.
         generator: For the draws.
+
+    Raises:
+        InvalidInput: The tool has too many regions.
     """
+    check_size(problem.n)
     own = problem.features  # perhaps with features switched off or added
     problem = on_features(problem, own if own.name == learned.policy.features else FEATURE_SETS[learned.policy.features])
-    unit = np.where(learned.policy.identifiable, 1 / learned.scale, 0.0)
-    values = np.ascontiguousarray(problem.tensor() * unit)
+    unit = unit_of(learned.scale, learned.policy.identifiable)
+    draw = _drawer(problem, unit, learned.fit.weights / BOLDNESS)
     root = np.linalg.cholesky(learned.fit.covariance)
     found: Counter[tuple[float, ...]] = Counter()
     shown: dict[tuple[float, ...], Sequence] = {}
@@ -72,10 +79,9 @@ def candidates_for(problem: SequencingProblem, learned: Generalised, generator: 
     weights, orders = DRAWS
     for _ in range(weights):
         w = (learned.fit.weights + root @ generator.normal(size=len(root))) / BOLDNESS
-        to_go, chosen = soft_to_go(values, w, problem.n)
-        drawn_weights.append((w, float(to_go[0])))
-        rows = drawn(chosen, problem.n, generator.random((orders, problem.n)))
-        for row, total in zip(rows, np.round(sums_of(problem, rows) * unit, DIGITS) + 0.0, strict=True):
+        start, rows, sums = draw(w, generator.random((orders, problem.n)))
+        drawn_weights.append((w, start))
+        for row, total in zip(rows, np.round(sums, DIGITS) + 0.0, strict=True):
             key = tuple(float(x) for x in total)
             found[key] += 1
             shown.setdefault(key, tuple(int(a) for a in row))
@@ -85,6 +91,27 @@ def candidates_for(problem: SequencingProblem, learned: Generalised, generator: 
     ranked = np.argsort(-probability, kind="stable")
     classes = tuple(classes[k] for k in ranked)
     return Candidates(classes, probability[ranked] / probability.sum(), _distances(classes))
+
+
+def _drawer(problem: SequencingProblem, unit: Array, w: Array) -> Callable[[Array, Array], tuple[float, Orders, Array]]:
+    """Of weights and uniform numbers: -log of the sum over all orders, orders drawn, and their feature sums in units."""
+    if problem.n <= TENSOR_LIMIT:
+        values = np.ascontiguousarray(problem.tensor() * unit)
+
+        def from_table(w: Array, uniform: Array) -> tuple[float, Orders, Array]:
+            to_go, chosen = soft_to_go(values, w, problem.n)
+            rows = drawn(chosen, problem.n, uniform)
+            return float(to_go[0]), rows, sums_of(problem, rows) * unit
+
+        return from_table
+    first, _, _ = cheapest_in(part_graph(problem, unit, w, ()), w)
+    graph = part_graph(problem, unit, w, (first,))
+
+    def from_part(w: Array, uniform: Array) -> tuple[float, Orders, Array]:
+        start, chosen = to_go_of(graph, w)
+        return start, *drawn_from(graph, chosen, uniform)
+
+    return from_part
 
 
 def next_pair(candidates: Candidates) -> tuple[int, int] | None:
@@ -135,10 +162,9 @@ def _expected(distance: Array, a: int, others: NDArray[np.int64]) -> NDArray[np.
 
 
 def _members(problem: SequencingProblem, order: Sequence) -> tuple[Sequence, ...]:
-    """Orders of equal features, those with the lowest ids; a diverse choice would take ten times as long."""
-    graph = equal_sums(problem, order, resolve(None, problem.n))
-    assert graph is not None, "the tool is small"
-    return tuple(sorted({order, *graph.members(0.0, MEMBERS)}))
+    """Orders of equal features, those with the lowest ids: a diverse choice would take ten times as long. Of large tools itself."""
+    graph = equal_sums(problem, order, resolve(None, problem.n)) if problem.n <= TENSOR_LIMIT else None
+    return (order,) if graph is None else tuple(sorted({order, *graph.members(0.0, MEMBERS)}))
 
 
 def _distances(classes: tuple[tuple[Sequence, ...], ...]) -> Array:

@@ -11,7 +11,7 @@ from app.learning.answering import Candidates, Reply, Sequence, after_answer, ca
 from app.learning.generalising import learn_generalising
 from app.learning.performance_state import LearningDemonstration
 from app.learning.questions import differing_regions, fingerprint
-from app.sequencing.problem import SequencingProblem
+from app.sequencing.problem import TENSOR_LIMIT, SequencingProblem
 
 WHY = (
     "The first of at most {most} questions about this tool. Any answer helps: which one is your way, or which comes closer to it.",
@@ -85,8 +85,8 @@ def exception_step(
     """Ask the next question, or settle the order; pure and deterministic.
 
     Args:
-        demonstrations: What the doubted policy was learned from; each tool has at most 14 regions.
-        tool: The doubted one, at most 14 regions.
+        demonstrations: What the doubted policy was learned from.
+        tool: The doubted one. Above 14 regions only orders through its likeliest sets are looked at, which the end says.
         parameters: How many questions.
         state: As the last step returned it.
         answers: By fingerprint; see `answering.Reply`.
@@ -119,6 +119,8 @@ def exception_step(
         f"Of {len(found.classes)} orders that were looked at this one fits your answers best (probability {share:.0%}). "
         "Look at it, and drop it if it isn't yours."
     )
+    if tool.n > TENSOR_LIMIT:
+        words += f" With {tool.n} regions the probability counts only orders through the likeliest sets of finished regions."
     return ExceptionResult(replace(state, order=found.classes[found.best][0], probability=share), (), words)
 
 

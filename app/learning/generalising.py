@@ -6,17 +6,32 @@ decided by the demonstrations, and by nothing else: the weights, how strongly th
 """
 
 import math
+from collections.abc import Sequence as Ordered
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from app.errors import InvalidInput
 from app.learning.certified import Certificate, certify
-from app.learning.hits import judge
-from app.learning.maximum_entropy import Lesson, SoftFit, fit, left_out_weights, lessons_of, surprise
+from app.learning.hits import HIT_SIZE, judge
+from app.learning.maximum_entropy import (
+    AnyLesson,
+    ListedLesson,
+    SoftFit,
+    fit,
+    in_part,
+    left_out_weights,
+    lessons_of,
+    listed,
+    settled,
+    surprise,
+    unit_of,
+)
 from app.learning.performance_state import LearningDemonstration
 from app.learning.policy import Policy
 from app.learning.qp import Array
+from app.learning.soft_graph import SAME, cheapest_in
+from app.sequencing.comparison import kendall_tau
 from app.sequencing.features import FEATURE_SETS, FeatureSet
 from app.sequencing.problem import TENSOR_LIMIT, SequencingProblem
 
@@ -51,6 +66,7 @@ class Generalised:
     trials: tuple[Trial, ...]
     scale: Array  # (F,) unit of each feature: the weights on scaled features are weights * scale
     fit: SoftFit  # on scaled features
+    approximate: tuple[int, ...] = ()  # demonstrations whose likelihood counts part of the orders only
 
     @property
     def chosen(self) -> Trial:
@@ -67,7 +83,8 @@ def learn_generalising(
     in which a table lists mirrored regions, which the expert's order follows but no one would call a policy.
 
     Args:
-        demonstrations: On tools of at most 14 regions; two or more, otherwise nothing can be left out and the strongest penalty is kept.
+        demonstrations: Two or more, otherwise nothing can be left out and the strongest penalty is kept. Above 14 regions features and
+            penalty are chosen with part of the orders; the weights are then learned with all of them up to 20 regions.
         sets: Names of the feature sets to choose from; the tools' own and "layout" if None.
         penalties: To choose from, strongest first.
 
@@ -80,20 +97,27 @@ def learn_generalising(
     if not demonstrations:
         raise InvalidInput("Learning needs at least one demonstration.")
     tried: list[tuple[Trial, SoftFit, Array, tuple[bool, ...]]] = []
+    taught: dict[str, tuple[list[LearningDemonstration], list[AnyLesson]]] = {}
     own = demonstrations[0].problem.features  # perhaps with features switched off or added
     known = {**FEATURE_SETS, own.name: own}
     for name in sets or (own.name, LAYOUT):
         shown = [replace(d, problem=on_features(d.problem, known[name])) for d in demonstrations]
         lessons, scale, live = lessons_of(shown)
+        lessons = settled(shown, lessons, unit_of(scale, live), penalties[0])
+        taught[shown[0].problem.features.name] = shown, lessons
         start = None
         for penalty in penalties if len(shown) > 1 else penalties[:1]:
             found = fit(lessons, penalty, start)
             start = found.weights
             tried.append((_tried(shown, lessons, found, np.array(live) / scale), found, scale, live))
     best, found, scale, live = max(tried, key=lambda t: t[0].merit)
+    shown, lessons = taught[best.features]
+    whole = listed(shown, lessons, unit_of(scale, live))
+    if in_part(whole) != in_part(lessons):
+        found = fit(whole, best.penalty, found.weights)
     features = known[best.features]
     policy = Policy(found.weights / scale * np.array(live), features.name, features.version, (), None, live)
-    return Generalised(policy, tuple(t for t, *_ in tried), scale, found)
+    return Generalised(policy, tuple(t for t, *_ in tried), scale, found, in_part(whole))
 
 
 @dataclass(frozen=True)
@@ -143,9 +167,9 @@ def exceptions_predict_better(demonstrations: list[LearningDemonstration], seed:
     """The likelihood's policy if it is on other features and, each demonstration left out in turn, predicts clearly more of them.
 
     Clearly is `CLEARLY` of the demonstrations, at least two. On the same features exact agreement decides: an expert who agrees with
-    them to the letter makes no exceptions. None below `FEWEST` demonstrations, and on tools that are too large for likelihood.
+    them to the letter makes no exceptions. None below `FEWEST` demonstrations, and above 14 regions: `why_untested` says so.
     """
-    if len(demonstrations) < FEWEST or any(d.problem.n > TENSOR_LIMIT for d in demonstrations):
+    if len(demonstrations) < FEWEST or why_untested(demonstrations):
         return None
     generalised = learn_generalising(demonstrations)
     if generalised.chosen.features == demonstrations[0].problem.features.name:
@@ -160,19 +184,58 @@ def exceptions_predict_better(demonstrations: list[LearningDemonstration], seed:
     return Exceptions(generalised, hits) if hits <= needed else None
 
 
-def _tried(shown: list[LearningDemonstration], lessons: list[Lesson], found: SoftFit, unit: Array) -> Trial:
+def why_untested(demonstrations: Ordered[LearningDemonstration]) -> str:
+    """Why `exceptions_predict_better` didn't look, in words; empty where it did, or where there are too few demonstrations."""
+    large = max(d.problem.n for d in demonstrations)
+    if len(demonstrations) < FEWEST or large <= TENSOR_LIMIT:
+        return ""
+    return (
+        f"Whether allowing for exceptions would predict better was not tested: that takes too long on tools of more than {TENSOR_LIMIT} "
+        f"regions, and one has {large}."
+    )
+
+
+def exactness(regions: Ordered[int], approximate: Ordered[int]) -> str:
+    """In words, whether the likelihood counted all orders of tools of these sizes; empty where all are small.
+
+    Args:
+        regions: Per demonstration, of its tool.
+        approximate: Demonstrations computed in part.
+    """
+    if max(regions) <= TENSOR_LIMIT:
+        return ""
+    if not approximate:
+        return "All orders of every tool were counted."
+    sizes = ", ".join(str(regions[k]) for k in approximate)
+    return (
+        f"On {len(approximate)} of {len(regions)} tools ({sizes} regions) only orders through the likeliest sets of finished regions were "
+        "counted: an approximation."
+    )
+
+
+def _tried(shown: list[LearningDemonstration], lessons: list[AnyLesson], found: SoftFit, unit: Array) -> Trial:
     """How well each demonstration is predicted without it."""
     without = left_out_weights(lessons, found) if len(lessons) > 1 else [found.weights]
     held_out = [surprise(lesson, w)[0] for lesson, w in zip(lessons, without, strict=True)]
-    judged = [judge(d.problem, w * unit, d.sequence) for d, w in zip(shown, without, strict=True)]
+    judged = [_judged(d, t, w, unit) for d, t, w in zip(shown, lessons, without, strict=True)]
     return Trial(
         shown[0].problem.features.name,
         found.penalty,
         found.surprise,
         float(np.mean(held_out)),
-        sum(j.hit for j in judged),
-        float(np.mean([j.tau for j in judged])),
+        sum(hit for hit, _ in judged),
+        float(np.mean([tau for _, tau in judged])),
     )
+
+
+def _judged(shown: LearningDemonstration, lesson: AnyLesson, w: Array, unit: Array) -> tuple[bool, float]:
+    """Hit and tau of a prediction; on listed transitions among the listed orders, ties counted among them too."""
+    if isinstance(lesson, ListedLesson):
+        order, cost, ties = cheapest_in(lesson.graph, w)
+        near = float(w @ lesson.total) - cost <= SAME * (1 + abs(cost))
+        return near and ties <= HIT_SIZE, kendall_tau(order, shown.sequence)
+    found = judge(shown.problem, w * unit, shown.sequence)
+    return found.hit, found.tau
 
 
 def on_features(problem: SequencingProblem, features: FeatureSet) -> SequencingProblem:

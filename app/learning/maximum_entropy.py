@@ -1,8 +1,11 @@
 """Maximum-entropy IRL on whole sequences, exact: p(xi) in proportion to exp(-w . Phi(xi)).
 
-Nothing is sampled: the sum over all N! sequences is a dynamic program over sets of finished regions.
+Nothing is sampled: the sum over all N! sequences is a dynamic program over sets of finished regions. Up to 14 regions all sets
+are in one table, up to 20 they are listed (`soft_graph`), while memory lasts. On larger tools only the sets around the demonstration and
+those where orders are likeliest count, so that alternatives far from both are left out of the sum: an approximation, which is said.
 """
 
+from collections.abc import Sequence as Ordered
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,13 +15,17 @@ from app.errors import InvalidInput
 from app.learning.performance_state import LearningDemonstration
 from app.learning.qp import Array
 from app.learning.sampling import feature_scale, feature_sums, random_pool
+from app.learning.soft_graph import MOST_REGIONS, SoftGraph, covariance_of, expected_sums_of, part_graph, to_go_of, whole_graph
 from app.learning.soft_program import expected_sums, soft_to_go
-from app.sequencing.problem import TENSOR_LIMIT
+from app.sequencing.problem import TENSOR_LIMIT, SequencingProblem
 
 POOL = 100  # random sequences per tool that measure a feature's unit
 SEED = 20230523  # of these sequences; fixed, so that the same demonstrations always give the same weights
 STEPS = 200  # of the quasi-Newton descent, at most
 NUDGE = 1e-4  # step of the differences behind the curvature
+LISTED_LIMIT = 20  # regions up to which all sets are listed
+LISTED_BYTES = 8e8  # of all lists together; what is beyond is computed in part
+SETTLING = 2  # times the kept sets are chosen anew under weights learned with those before
 
 
 @dataclass(frozen=True)
@@ -31,6 +38,21 @@ class Lesson:
     @property
     def n(self) -> int:
         return self.values.shape[1]
+
+
+@dataclass(frozen=True)
+class ListedLesson:
+    """The same on a tool whose transitions are listed."""
+
+    graph: SoftGraph
+    total: Array  # (F,)
+
+    @property
+    def n(self) -> int:
+        return self.graph.n
+
+
+AnyLesson = Lesson | ListedLesson
 
 
 @dataclass(frozen=True)
@@ -49,30 +71,88 @@ class SoftFit:
         return np.linalg.inv(self.curvatures.sum(axis=0) + lessons * self.penalty * np.eye(size))
 
 
-def lessons_of(demonstrations: list[LearningDemonstration]) -> tuple[list[Lesson], Array, tuple[bool, ...]]:
+def lessons_of(demonstrations: list[LearningDemonstration]) -> tuple[list[AnyLesson], Array, tuple[bool, ...]]:
     """Demonstrations with features scaled to unit deviation within a tool, the units, and which features vary at all.
 
+    Above 14 regions in part, around the demonstration alone; `settled` chooses better parts, `listed` whole ones.
+
     Raises:
-        InvalidInput: A tool has more regions than the table of all transitions can hold.
+        InvalidInput: A tool has too many regions.
     """
-    large = max((d.problem.n for d in demonstrations), default=0)
-    if large > TENSOR_LIMIT:
-        raise InvalidInput(f"Learning from likelihood needs tools of at most {TENSOR_LIMIT} regions; one has {large}.")
+    check_size(max((d.problem.n for d in demonstrations), default=0))
     generators = [np.random.default_rng([SEED, d.problem.n]) for d in demonstrations]
     sums = [feature_sums(d.problem, random_pool(d.problem, POOL, g)) for d, g in zip(demonstrations, generators, strict=True)]
     scale, live = feature_scale(sums)
-    unit = np.where(live, 1 / scale, 0.0)  # a constant says nothing; its weight stays 0
-    lessons = [Lesson(np.ascontiguousarray(d.problem.tensor() * unit), d.problem.feature_sum(d.sequence) * unit) for d in demonstrations]
-    return lessons, scale, live
+    unit = unit_of(scale, live)
+    return [_lesson(d, unit, np.zeros(len(unit))) for d in demonstrations], scale, live
 
 
-def surprise(lesson: Lesson, w: Array) -> tuple[float, Array]:
+def check_size(regions: int) -> None:
+    """Refuse what even a part can't be computed for.
+
+    Raises:
+        InvalidInput: Too many regions.
+    """
+    if regions > MOST_REGIONS:
+        raise InvalidInput(f"Learning from likelihood needs tools of at most {MOST_REGIONS} regions; one has {regions}.")
+
+
+def unit_of(scale: Array, live: Ordered[bool]) -> Array:
+    """What features are multiplied with; a constant says nothing, its weight stays 0."""
+    return np.where(live, 1 / scale, 0.0)
+
+
+def _lesson(shown: LearningDemonstration, unit: Array, w: Array) -> AnyLesson:
+    total = shown.problem.feature_sum(shown.sequence) * unit
+    if shown.problem.n <= TENSOR_LIMIT:
+        return Lesson(np.ascontiguousarray(shown.problem.tensor() * unit), total)
+    return ListedLesson(part_graph(shown.problem, unit, w, (shown.sequence,)), total)
+
+
+def settled(shown: list[LearningDemonstration], lessons: list[AnyLesson], unit: Array, penalty: float) -> list[AnyLesson]:
+    """Lessons in part whose sets are the likeliest ones under weights learned with them; others as they are."""
+    for _ in range(SETTLING if any(isinstance(t, ListedLesson) for t in lessons) else 0):
+        w = fit(lessons, penalty, curved=False).weights
+        lessons = [t if isinstance(t, Lesson) else _lesson(d, unit, w) for d, t in zip(shown, lessons, strict=True)]
+    return lessons
+
+
+def listed(shown: list[LearningDemonstration], lessons: list[AnyLesson], unit: Array) -> list[AnyLesson]:
+    """Lessons with all sets listed where that fits, the smallest tools first; others as they are."""
+    left, found = LISTED_BYTES, list(lessons)
+    for k in sorted(range(len(found)), key=lambda k: shown[k].problem.n):
+        if isinstance(found[k], ListedLesson) and (need := listed_bytes(shown[k].problem)) <= left:
+            left -= need
+            found[k] = ListedLesson(whole_graph(shown[k].problem, unit), found[k].total)
+    return found
+
+
+def listed_bytes(problem: SequencingProblem) -> float:
+    """Memory of the list of all transitions of a tool; infinite where it isn't made."""
+    transitions = problem.n * 2.0 ** (problem.n - 1)
+    return transitions * (4 * len(problem.columns) + 5) if problem.n <= LISTED_LIMIT else np.inf
+
+
+def in_part(lessons: Ordered[AnyLesson]) -> tuple[int, ...]:
+    """The lessons whose likelihood is an approximation."""
+    return tuple(k for k, t in enumerate(lessons) if isinstance(t, ListedLesson) and not t.graph.whole)
+
+
+def log_sum(lesson: AnyLesson, w: Array) -> float:
+    """-log of the sum of exp(-cost) over the tool's orders."""
+    return to_go_of(lesson.graph, w)[0] if isinstance(lesson, ListedLesson) else float(soft_to_go(lesson.values, w, lesson.n)[0][0])
+
+
+def surprise(lesson: AnyLesson, w: Array) -> tuple[float, Array]:
     """-log p of the demonstration and its gradient (F,): the demonstrated minus the expected feature sum."""
+    if isinstance(lesson, ListedLesson):
+        start, chosen = to_go_of(lesson.graph, w)
+        return float(w @ lesson.total) - start, lesson.total - expected_sums_of(lesson.graph, chosen)
     to_go, chosen = soft_to_go(lesson.values, w, lesson.n)
     return float(w @ lesson.total - to_go[0]), lesson.total - expected_sums(lesson.values, chosen, lesson.n)
 
 
-def fit(lessons: list[Lesson], penalty: float, start: Array | None = None, lower: Array | None = None, curved: bool = True) -> SoftFit:
+def fit(lessons: list[AnyLesson], penalty: float, start: Array | None = None, lower: Array | None = None, curved: bool = True) -> SoftFit:
     """Minimise the mean surprise + penalty / 2 * |w|^2.
 
     Args:
@@ -98,14 +178,21 @@ def fit(lessons: list[Lesson], penalty: float, start: Array | None = None, lower
     return SoftFit(w, penalty, known, curvatures_at(lessons, w) if curved else np.zeros((0, size, size)))
 
 
-def curvatures_at(lessons: list[Lesson], w: Array) -> Array:
-    """Per lesson the covariance of the feature sums under w, (lessons, F, F), by central differences of the exact gradient."""
+def curvatures_at(lessons: Ordered[AnyLesson], w: Array) -> Array:
+    """Per lesson the covariance of the feature sums under w, (lessons, F, F)."""
+    return np.array([_curvature(t, w) for t in lessons])
+
+
+def _curvature(lesson: AnyLesson, w: Array) -> Array:
+    """By one pass over listed transitions, else by central differences of the exact gradient."""
+    if isinstance(lesson, ListedLesson):
+        return covariance_of(lesson.graph, to_go_of(lesson.graph, w)[1])
     steps = NUDGE * np.eye(len(w))
-    rows = np.array([[(surprise(t, w + step)[1] - surprise(t, w - step)[1]) / (2 * NUDGE) for step in steps] for t in lessons])
-    return (rows + rows.transpose(0, 2, 1)) / 2
+    rows = np.array([(surprise(lesson, w + step)[1] - surprise(lesson, w - step)[1]) / (2 * NUDGE) for step in steps])
+    return (rows + rows.T) / 2
 
 
-def left_out_weights(lessons: list[Lesson], found: SoftFit) -> list[Array]:
+def left_out_weights(lessons: Ordered[AnyLesson], found: SoftFit) -> list[Array]:
     """Per demonstration the weights that would be learned without it, each by one Newton step from the joint ones."""
     others, identity = len(lessons) - 1, found.penalty * np.eye(len(found.weights))
     joint = found.curvatures.sum(axis=0)

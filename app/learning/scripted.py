@@ -136,7 +136,7 @@ def answer_about(
 
     Args:
         learned: From the demonstrations of other tools.
-        tool: At most 14 regions.
+        tool: The one that is asked about.
         wanted: Any of them is as good to the expert as another.
         seed: Of the candidates.
         most: Questions asked at most.

@@ -12,9 +12,10 @@ from app.learning.certified_state import ToolChance
 from app.learning.generalising import Generalised
 from app.learning.many_optima import cheapest_orders, sums_of
 from app.learning.qp import Array
-from app.sequencing.problem import SequencingProblem
+from app.sequencing.problem import TENSOR_LIMIT, SequencingProblem
 
 DRAWN = 64
+COSTLY = 12  # of them looked at on a tool above 14 regions, where each is a search of its own
 CREDIBLE = (0.05, 0.95)
 EQUAL = 1e-9  # relative: costs this close are the same
 DIGITS = 7  # of a cost relative to its size, by which classes are told apart
@@ -47,7 +48,10 @@ def sureness(found: Generalised, tools: Ordered[SequencingProblem], tolerance: f
     return Sureness(
         tuple(float(x) for x in shares[0]),
         tuple((float(a), float(b)) for a, b in zip(low, high, strict=True)),
-        tuple(_chance(t, problem, weights, tolerance) for t, problem in enumerate(tools)),
+        tuple(
+            _chance(t, problem, weights if problem.n <= TENSOR_LIMIT else weights[: 1 + COSTLY], tolerance)
+            for t, problem in enumerate(tools)
+        ),
     )
 
 

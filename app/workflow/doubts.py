@@ -5,7 +5,7 @@ from typing import Any
 from sqlmodel import Session
 
 from app.errors import Conflict, InvalidInput, NotFound
-from app.sequencing.problem import TENSOR_LIMIT
+from app.learning.soft_graph import MOST_REGIONS
 from app.storage.tables import PolicyRow, Project, Run, RunDemonstration, Segmentation, ToolRow
 from app.workflow.context import Context
 from app.workflow.exceptions import drop, kept_orders
@@ -77,16 +77,16 @@ def _suitable(session: Session, tool: ToolRow, cut: Segmentation, learned: Run) 
     """Position, id and tool of the demonstrations a policy was learned from that likelihood can be computed on."""
     if any(d.tool_id == tool.id for d in standing(session, tool.project_id)):
         raise InvalidInput(f"{tool.name} has a recorded order. Record it again instead of answering questions about it.")
-    if cut.region_count > TENSOR_LIMIT:
+    if cut.region_count > MOST_REGIONS:
         raise InvalidInput(
-            f"Questions about one tool work up to {TENSOR_LIMIT} regions; {tool.name} has {cut.region_count}. Record its order instead."
+            f"Questions about one tool work up to {MOST_REGIONS} regions; {tool.name} has {cut.region_count}. Record its order instead."
         )
     cuts = [(d, found(session, Segmentation, d.segmentation_id, "segmentation")) for d in demonstrations_of(session, learned.id)]
     if any(c.feature_set != cut.feature_set for _, c in cuts):
         raise InvalidInput(f"{tool.name} is described by other features than the tools this policy was learned from.")
-    kept = [(d.id, d.tool_id) for d, c in cuts if c.region_count <= TENSOR_LIMIT]
+    kept = [(d.id, d.tool_id) for d, c in cuts if c.region_count <= MOST_REGIONS]
     if not kept:
         raise InvalidInput(
-            f"Questions about one tool need a recorded order on a tool of at most {TENSOR_LIMIT} regions; this policy has none."
+            f"Questions about one tool need a recorded order on a tool of at most {MOST_REGIONS} regions; this policy has none."
         )
     return [(position, *ids) for position, ids in enumerate(kept)]

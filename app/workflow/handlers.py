@@ -10,6 +10,7 @@ WARM_UP = (
     "app.learning.many_optima.warm_up",
     "app.learning.version_space.warm_up",
     "app.learning.soft_program.warm_up",
+    "app.learning.soft_graph.warm_up",
 )
 
 

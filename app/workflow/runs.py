@@ -6,8 +6,8 @@ from sqlmodel import Session, col, select
 
 from app.errors import Conflict, InvalidInput
 from app.jobs.rows import cancel_jobs
+from app.learning.soft_graph import MOST_REGIONS
 from app.sequencing.features import base_name
-from app.sequencing.problem import TENSOR_LIMIT
 from app.storage.tables import (
     ACTIVE_RUN_STATES,
     Demonstration,
@@ -190,7 +190,7 @@ def finish_run(ctx: Context, run_id: str) -> Json:
         words = "Finished with what was learned so far." if row.state == "stalled" else _compromise_words(session, row)
         if row.state == "infeasible" and row.mode == "certified":
             words += (
-                f" A tool has more than {TENSOR_LIMIT} regions, so exceptions can't be allowed for; these weights break the orders least."
+                f" A tool has more than {MOST_REGIONS} regions, so exceptions can't be allowed for; these weights break the orders least."
             )
         row.error = None
         go(session, row, "converged", words)
@@ -202,7 +202,7 @@ def finish_run(ctx: Context, run_id: str) -> Json:
 def _small_enough(session: Session, row: Run) -> bool:
     """Whether likelihood can be computed on every tool of a run."""
     cuts = [found(session, Segmentation, d.segmentation_id, "segmentation") for d in demonstrations_of(session, row.id)]
-    return all(cut.region_count <= TENSOR_LIMIT for cut in cuts)
+    return all(cut.region_count <= MOST_REGIONS for cut in cuts)
 
 
 def _compromise_words(session: Session, row: Run) -> str:

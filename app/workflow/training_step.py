@@ -10,7 +10,7 @@ from app.learning.certified_run import Memory, certified_step, start_certified
 from app.learning.certified_state import CertifiedParameters, CertifiedState
 from app.learning.effort import EffortParameters, EffortState, effort_step, start_effort
 from app.learning.exception_run import ExceptionMemory, ExceptionParameters, ExceptionState, exception_step
-from app.learning.generalising import Generalised, exceptions_predict_better, learn_generalising, on_features
+from app.learning.generalising import Generalised, exactness, exceptions_predict_better, learn_generalising, on_features, why_untested
 from app.learning.performance import (
     LearningDemonstration,
     PerformanceParameters,
@@ -24,7 +24,7 @@ from app.learning.qp import Array
 from app.learning.selecting import Selection, select_interactions
 from app.learning.sureness import sureness
 from app.sequencing.features import FEATURE_SETS, Interaction
-from app.sequencing.problem import TENSOR_LIMIT, SequencingProblem
+from app.sequencing.problem import SequencingProblem
 from app.workflow.values import Kept
 
 Json = dict[str, Any]
@@ -126,6 +126,7 @@ def _begin(
     if exceptions is not None:
         return _likelihood(exceptions.generalised, known, tools, AGREE.format(exceptions.certified_hits, len(known)))
     out = _certified(step, parameters, demonstrations, [_counting(t, chosen) for t in tools])
+    out = replace(out, message=f"{out.message} {why_untested(demonstrations)}".rstrip())
     return replace(out, interactions=chosen.kept, report={**(out.report or {}), "interactions": chosen.to_json(known[0])})
 
 
@@ -159,13 +160,12 @@ def _likelihood(found: Generalised, demonstrations: list[LearningDemonstration],
     chosen, policy, count = found.chosen, found.policy, len(demonstrations)
     own = demonstrations[0].problem.features
     features = own if policy.features == own.name else FEATURE_SETS[policy.features]
-    fit = [on_features(t, features) for t in tools if t.n <= TENSOR_LIMIT]
-    sure = sureness(found, fit, CertifiedParameters().tolerance)
-    places = [t for t, problem in enumerate(tools) if problem.n <= TENSOR_LIMIT]
+    sure = sureness(found, [on_features(t, features) for t in tools], CertifiedParameters().tolerance)
+    counted = exactness([d.problem.n for d in demonstrations], found.approximate)
     report = {
         "shares": list(sure.shares),
         "intervals": [list(x) for x in sure.intervals],
-        "tools": [{**vars(c), "tool": places[c.tool]} for c in sure.tools],
+        "tools": [vars(c) for c in sure.tools],
         "expected_wrong": sum(1 - c.probability for c in sure.tools),
         "kind": LIKELIHOOD,
         "held_out_hits": chosen.hits,
@@ -173,8 +173,9 @@ def _likelihood(found: Generalised, demonstrations: list[LearningDemonstration],
         "tau": chosen.tau,
         "features": chosen.features,
         "penalty": chosen.penalty,
+        "exactness": counted,
     }
-    words = f"{why} {chosen.hits} of {count} are predicted from the others (mean agreement {chosen.tau:.2f})."
+    words = f"{why} {chosen.hits} of {count} are predicted from the others (mean agreement {chosen.tau:.2f}). {counted}".rstrip()
     weights, decided = _floats(policy.weights), tuple(bool(x) for x in policy.identifiable)
     return Outcome({}, "compromise", 0, (), (), weights, decided, words, None, report, policy.features)
 

@@ -62,3 +62,16 @@ def test_the_scripted_expert_compares_by_the_nearest_wanted_order():
     assert reply_of((0, 1, 2), (2, 1, 0), ((2, 0, 1), (1, 2, 0))) == "right"
     assert reply_of((0, 1, 2), (0, 1, 2), ((1, 2, 0),)) == "equal"
     assert reply_of((0, 1, 2), (2, 1, 0), ((2, 1, 0), (1, 2, 0))) == "right_mine"
+
+
+def test_a_tool_of_eighteen_regions_is_asked_about(learned: Generalised):
+    """Beyond the table of all sets: an order that isn't the likeliest is found by its answers."""
+    found = candidates_for(problem_for(grid_graph(3, 6, 2), ()), learned, np.random.default_rng(0))
+    wanted = found.classes[3]
+    for _ in range(6):
+        pair = next_pair(found)
+        if pair is None:  # one of those shown was the expert's own
+            break
+        found = after_answer(found, pair, reply_of(found.classes[pair[0]][0], found.classes[pair[1]][0], wanted))
+    assert found.probability.sum() == pytest.approx(1)
+    assert found.classes[found.best] == wanted

@@ -6,7 +6,19 @@ import numpy as np
 import pytest
 
 from app.errors import InvalidInput
-from app.learning.maximum_entropy import curvatures_at, fit, left_out_weights, lessons_of, surprise
+from app.learning import maximum_entropy
+from app.learning.generalising import exactness, learn_generalising
+from app.learning.maximum_entropy import (
+    curvatures_at,
+    fit,
+    in_part,
+    left_out_weights,
+    lessons_of,
+    listed,
+    settled,
+    surprise,
+    unit_of,
+)
 from app.learning.performance_state import LearningDemonstration
 from app.learning.soft_program import drawn, soft_to_go
 from app.sequencing.features import FEATURE_SETS
@@ -71,6 +83,39 @@ def test_left_out_weights_are_near_those_of_learning_without():
         assert np.linalg.norm(near[k] - true) < 0.6 * np.linalg.norm(joint.weights - true)
 
 
-def test_tools_beyond_the_table_are_refused():
-    with pytest.raises(InvalidInput, match="at most 14 regions; one has 15"):
-        lessons_of([LearningDemonstration(SequencingProblem(grid_graph(3, 5, 1), FEATURE_SETS["layout"], ()), tuple(range(15)))])
+def test_listed_transitions_teach_what_the_table_teaches(monkeypatch):
+    """Exact in single precision; in part close to it: same direction, no smaller surprise than it claims by more than a twentieth."""
+    shown = [demonstrated(s) for s in (1, 2, 3)]
+    lessons, scale, live = lessons_of(shown)
+    exact = fit(lessons, 0.1)
+    monkeypatch.setattr(maximum_entropy, "TENSOR_LIMIT", 5)
+    unit = unit_of(scale, live)
+    part = settled(shown, lessons_of(shown)[0], unit, 0.1)
+    assert in_part(part) == (0, 1, 2)
+    whole = listed(shown, part, unit)
+    assert in_part(whole) == ()
+    found = fit(whole, 0.1)
+    assert found.weights == pytest.approx(exact.weights, abs=2e-3)
+    assert np.abs(found.curvatures - exact.curvatures).max() < 5e-3
+    rough = fit(settled(shown, lessons_of(shown)[0], unit, 0.1), 0.1)
+    cosine = rough.weights @ exact.weights / np.linalg.norm(rough.weights) / np.linalg.norm(exact.weights)
+    assert cosine > 0.99
+    assert rough.surprise == pytest.approx(exact.surprise, rel=0.05)
+
+
+def test_sixteen_regions_are_learned_from_exactly_and_thirty_in_part():
+    """No silent limit: the large tool is named as an approximation, and its recorded order is likelier than a shuffled one."""
+    features = FEATURE_SETS["layout"]
+    sizes = ((4, 4), (5, 6))
+    shown = [LearningDemonstration(SequencingProblem(grid_graph(r, c, 1), features, ()), tuple(range(r * c))) for r, c in sizes]
+    learned = learn_generalising(shown, ("layout",), (0.1,))
+    assert learned.approximate == (1,)
+    assert "On 1 of 2 tools (30 regions)" in exactness([16, 30], learned.approximate)
+    for d in shown:
+        other = tuple(int(a) for a in np.random.default_rng(0).permutation(d.problem.n))
+        assert d.problem.cost(learned.policy.weights, d.sequence) < d.problem.cost(learned.policy.weights, other)
+
+
+def test_tools_beyond_one_integer_are_refused():
+    with pytest.raises(InvalidInput, match="at most 62 regions; one has 63"):
+        lessons_of([LearningDemonstration(SequencingProblem(grid_graph(7, 9, 1), FEATURE_SETS["layout"], ()), tuple(range(63)))])

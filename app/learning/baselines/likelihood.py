@@ -3,10 +3,9 @@
 import numpy as np
 
 from app.learning.baselines.learner import Learned, by_weights
-from app.learning.maximum_entropy import Lesson, fit, lessons_of
+from app.learning.maximum_entropy import AnyLesson, fit, lessons_of, log_sum
 from app.learning.performance_state import LearningDemonstration
 from app.learning.qp import Array
-from app.learning.soft_program import soft_to_go
 
 PENALTY = 0.3  # of the squared norm; the best of those tried in the study this baseline comes from
 STEPS = 400  # of the Markov chain
@@ -29,7 +28,7 @@ def by_bayes(demonstrations: list[LearningDemonstration], generator: np.random.G
     return by_weights(demonstrations, chain.mean(axis=0) / scale * np.array(live), live)
 
 
-def posterior_chain(lessons: list[Lesson], generator: np.random.Generator, steps: int = STEPS) -> Array:
+def posterior_chain(lessons: list[AnyLesson], generator: np.random.Generator, steps: int = STEPS) -> Array:
     """Samples of w >= 0 (S, F) on scaled features, after the burn-in.
 
     The walk starts at the most likely weights and steps with their covariance, so that the short chain spends its time where the
@@ -50,7 +49,7 @@ def posterior_chain(lessons: list[Lesson], generator: np.random.Generator, steps
     return np.array(kept[int(BURN * steps) :])
 
 
-def _level(lessons: list[Lesson], w: Array) -> float:
+def _level(lessons: list[AnyLesson], w: Array) -> float:
     """log of prior times likelihood, up to a constant."""
-    likelihood = sum(float(soft_to_go(t.values, w, t.n)[0][0] - w @ t.total) for t in lessons)
+    likelihood = sum(log_sum(t, w) - float(w @ t.total) for t in lessons)
     return likelihood - PENALTY * len(lessons) / 2 * float(w @ w)
