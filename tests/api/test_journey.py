@@ -10,6 +10,7 @@ from starlette.testclient import TestClient
 from tests.api.problems import check_problem
 from tests.conftest import Api
 
+EFFORT_OPTIONS = ("travel", "side_changes")
 SETTLED = ("waiting_for_expert", "converged", "stalled", "infeasible", "failed", "cancelled")
 
 
@@ -116,12 +117,19 @@ def test_teaching_to_the_robot(api: Api, sample: dict[str, Any]) -> None:
     later = api.get(f"/runs/{run['id']}/metrics", params={"after": metrics[2]["iteration"]})["items"]
     assert later == metrics[3:]
 
-    effort = teach(api, api.post(f"/projects/{project}/runs", {"kind": "effort", "seed": 3}, status=202), "left")
+    check_effort_options(api, project)
+    wanted = {"kind": "effort", "seed": 3, "params": {"travel": True, "side_changes": True}}
+    effort = teach(api, api.post(f"/projects/{project}/runs", wanted, status=202), "left")
     effort = api.until(f"/runs/{effort['id']}", lambda row: row["state"] in ("converged", "infeasible", "failed"))
     assert effort["state"] == "converged", effort
 
     tool = next(t for t in api.get(f"/projects/{project}/tools")["items"] if t["split"] == "test")
-    policy = api.get(f"/policies/{effort['policy_id'] or run['policy_id']}")
+    policy = api.get(f"/policies/{effort['policy_id']}")
+    assert {p["key"]: p["value"] for p in effort["parameters"] if p["key"] in EFFORT_OPTIONS} == dict.fromkeys(EFFORT_OPTIONS, True)
+    learned = {w["key"]: w["value"] for w in policy["effort_weights"]}
+    assert {key.partition("_")[0] for key in learned} == {"start", "end", "travel", "side"}
+    assert all(learned[key] >= 0 for key in EFFORT_OPTIONS)  # an effort, or none
+    assert any(learned.values())
     assert {p["id"] for p in api.get(f"/projects/{project}/policies")["items"]} >= {run["policy_id"]}
     plan = api.post(f"/policies/{policy['id']}/plans", {"tool_id": tool["id"]})
     assert sorted(plan["sequence"]) == list(range(tool["region_count"]))
@@ -169,6 +177,16 @@ def test_undo_of_an_answer_asks_again(api: Api, sample: dict[str, Any]) -> None:
         assert api.get(f"/queries/{query['id']}")["answer"]["value"] == "left"
         reopened = api.post(f"/answers/{answer['id']}/undo", status=200)
         assert (reopened["state"], reopened["answer"]) == ("open", None)
+
+
+def check_effort_options(api: Api, project: str) -> None:
+    """Start and end always count; long ways and changes of side are switched on, with true or false."""
+    offered = api.get(f"/projects/{project}/run-defaults", params={"kind": "effort"})["parameters"]
+    assert [(p["value"], p["default"]) for p in offered if p["key"] in EFFORT_OPTIONS] == [(False, False)] * 2
+    told = api.post(f"/projects/{project}/runs", {"kind": "effort", "params": {"travel": 3}}, status=422)["detail"]
+    assert "true or false" in told
+    told = api.post(f"/projects/{project}/runs", {"kind": "effort", "params": {"distance": True}}, status=422)["detail"]
+    assert "travel, side_changes" in told
 
 
 def check_left_out(api: Api, policy: str, tool: str) -> None:
