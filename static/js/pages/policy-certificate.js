@@ -19,7 +19,7 @@ export function verdict({ certificate }) {
   const conflicts = certificate.conflicts?.length ?? 0;
   if (certificate.kind === "likelihood") {
     const why = conflicts ? "No weights explain all of them, so exceptions are allowed for." : "Exceptions are allowed for: that predicts your orders better than weights that explain each exactly.";
-    return { mark: "half", tone: "warn", title: `Predicts ${certificate.held_out_hits} of your ${plural(certificate.of, "order")}`, text: `Each was left out of learning in turn. ${why}` };
+    return { mark: "half", tone: "warn", title: `Predicts ${certificate.held_out_hits} of your ${plural(certificate.of, "order")}`, text: ["Each was left out of learning in turn.", why, certificate.exactness].filter(Boolean).join(" ") };
   }
   if (!certificate.realisable) return { mark: "warn", tone: "bad", title: "Not every recorded order is a cheapest one", text: "No weights explain all of them; these come nearest." };
   const next = certificate.margin > 0 ? `The nearest other order met costs ${dearer(certificate.margin)} more.` : "";
@@ -51,7 +51,7 @@ export class Certificate {
     if (chance) return `Sure of this order: ${percent(chance.probability)}`;
     const shown = certificate?.demonstrations?.find((entry) => entry.tool_id === tool.id);
     if (shown) return shown.slack > NOTHING ? `Your order of ${tool.name} costs ${dearer(shown.slack)} more than the cheapest` : `Your order of ${tool.name} is among the cheapest`;
-    return "What that means";
+    return certificate ? "How sure this order is: known after learning again" : "What that means";
   }
 
   name(entry) {
