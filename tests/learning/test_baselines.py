@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.errors import InvalidInput
 from app.learning.baselines.copying import copy_nearest, draw_weights, middle_first, rows_of
 from app.learning.baselines.likelihood import by_maximum_entropy, posterior_chain
 from app.learning.baselines.margin_planning import margin_weights, plan_by_margin
@@ -83,3 +84,8 @@ def test_rows_and_copied_pattern():
     assert learned.order(known.problem) == known.sequence
     other = problem_for(grid_graph(3, 2, 3), ())
     assert len(set(learned.order(other))) == 6
+
+
+def test_margin_planning_refuses_tools_beyond_the_table():
+    with pytest.raises(InvalidInput, match="at most 14 regions"):
+        plan_by_margin([LearningDemonstration(problem_for(grid_graph(3, 5, 1), ()), tuple(range(15)))], np.random.default_rng(0))

@@ -7,11 +7,13 @@ an exact shortest path under costs lowered by the loss. Sequences are added unti
 
 import numpy as np
 
+from app.errors import InvalidInput
 from app.learning.baselines.learner import Learned, by_weights
 from app.learning.maximum_entropy import Lesson, lessons_of
 from app.learning.performance_state import LearningDemonstration
 from app.learning.qp import Array, QuadraticProgram, solve
 from app.sequencing import kernels
+from app.sequencing.problem import TENSOR_LIMIT
 
 PENALTY = 0.01  # lambda
 ROUNDS = 60
@@ -19,9 +21,16 @@ ENOUGH = 1e-6  # a sequence violated by no more than this beyond its slack is no
 
 
 def plan_by_margin(demonstrations: list[LearningDemonstration], generator: np.random.Generator) -> Learned:
-    """The quadratic program's weights; the generator is not used."""
+    """The quadratic program's weights; the generator is not used.
+
+    Raises:
+        InvalidInput: A tool has more regions than the table of all transitions can hold.
+    """
     del generator
-    lessons, scale, live = lessons_of(demonstrations)
+    found, scale, live = lessons_of(demonstrations)
+    lessons = [lesson for lesson in found if isinstance(lesson, Lesson)]
+    if len(lessons) < len(found):
+        raise InvalidInput(f"Max-margin planning takes tools of at most {TENSOR_LIMIT} regions here; leave the larger ones out.")
     w = margin_weights(lessons, [d.sequence for d in demonstrations])
     return by_weights(demonstrations, w / scale * np.array(live), live)
 
