@@ -11,6 +11,7 @@ Deterministic for a seed; the best order so far only ever gets cheaper.
 import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from heapq import heapify, heappop, heappush
 
 import numpy as np
 
@@ -104,11 +105,15 @@ class Search:
 
     def sorted_by(self, key: Array) -> Order:
         """The free regions by `key`, each as soon as those that must precede it are there."""
-        waiting, order = {int(a) for a in self.free}, []
-        while waiting:
-            ready = [a for a in waiting if not any(self.before[b, a] for b in waiting)]
-            order.append(min(ready, key=lambda a: (key[a], a)))
-            waiting.remove(order[-1])
+        blockers, order = self.before[self.free].sum(axis=0), []
+        ready = [(float(key[a]), int(a)) for a in self.free if not blockers[a]]
+        heapify(ready)
+        while ready:
+            order.append(heappop(ready)[1])
+            for b in np.flatnonzero(self.before[order[-1]]).tolist():
+                blockers[b] -= 1
+                if not blockers[b]:
+                    heappush(ready, (float(key[b]), b))
         return np.array(order, np.int64)
 
     def sweeps(self) -> Iterator[Order]:
@@ -134,7 +139,7 @@ class Search:
             before = cost
             for start in starts:
                 trial = self.reinsert(order, start, start + size, np.arange(start, start + size))
-                value = self.cost(trial)
+                value = cost if np.array_equal(trial, order) else self.cost(trial)
                 if value < cost:
                     cost, order = value, trial
             if cost > before - IMPROVES * max(1e-300, abs(before)):
@@ -310,7 +315,7 @@ def _wander(
         if should_stop():
             break
         trial = search.move(order, effort)
-        value = search.cost(trial)
+        value = cost if np.array_equal(trial, order) else search.cost(trial)
         idle = 0 if value < cost - IMPROVES * abs(cost) else idle + 1
         if value <= cost + IMPROVES * abs(cost):
             cost, order = value, trial
