@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
-from app.benches.plots import bars_as_svg
+from app.benches.plots import Bars, bars_as_svg
 from tests.conftest import LiveServer
 
 pytestmark = pytest.mark.browser
@@ -28,7 +28,8 @@ def test_studies(quiet_page: Page, server: LiveServer) -> None:
     expect(page.locator("code")).to_contain_text(f"--out {place}/compare")
 
     save(place / "compare", "2026-01-02T00:00:00+00:00", ["4/4", "1/4"])
-    (place / "compare" / "hits.svg").write_text(bars_as_svg("Hits", "%", ("ours", "random"), {"hit": np.array([100.0, 25.0])}))
+    bars = Bars("Hits", "%", ("ours", "random"), {"hit": np.array([100.0, 25.0])}, {"hit": ("4/4", "1/4")})
+    (place / "compare" / "hits.svg").write_text(bars_as_svg(bars))
     save(place / "effort", "2026-02-02T00:00:00+00:00", ["9/9", "2/9"])
     page.reload()
     expect(page.locator("tbody")).to_contain_text("9/9")
