@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, QhullError
 
-from app.geometry.cleaning import edge_table
+from app.geometry.cleaning import edge_table, joined
+from app.geometry.compiled import kernel
 from app.geometry.tool import Array, Mesh
 
 Integers = NDArray[np.int64]
@@ -42,32 +42,38 @@ class Borders:
 
 def find_borders(mesh: Mesh, labels: NDArray[np.int32]) -> Borders:
     """Edges where the region changes, the working surface ends, or the mesh isn't a surface (1 or more than 2 faces)."""
-    edges, side_edge, count = edge_table(mesh.faces)
-    flat = side_edge.ravel()
-    owner = np.repeat(labels.astype(np.int64), 3)
-    order = np.argsort(flat, kind="stable")
-    start = np.concatenate([[0], np.cumsum(count)[:-1]])
-    beyond, beyond_side = np.full(len(flat), FREE), np.full(len(flat), FREE)
-    two = np.flatnonzero(count == 2)
-    first, second = order[start[two]], order[start[two] + 1]
-    beyond[first], beyond[second] = owner[second], owner[first]
-    beyond_side[first], beyond_side[second] = second, first
-    listed = (owner >= 0) & (beyond != owner)
-    if (count > 2).any():
-        listed &= ~_inside_crowded(edges, flat, owner, count)
-    face, side = np.divmod(np.flatnonzero(listed), 3)
+    _, side_edge, count = edge_table(mesh.faces)
+    sides, beyond_face = _border_sides(side_edge, count, labels.astype(np.int64))
+    face, side = np.divmod(sides, 3)
     ends = np.stack([mesh.faces[face, side], mesh.faces[face, (side + 1) % 3]], axis=1).astype(np.int64)
     length = np.linalg.norm(mesh.vertices[ends[:, 0]] - mesh.vertices[ends[:, 1]], axis=1)
-    # a triangle has three sides; FREE // 3 stays FREE
-    return Borders(owner[listed], beyond[listed], ends, length, np.flatnonzero(listed) // 3, beyond_side[listed] // 3)
+    beyond = np.where(beyond_face == FREE, FREE, labels[beyond_face]).astype(np.int64)
+    return Borders(labels[face].astype(np.int64), beyond, ends, length, face, beyond_face)
 
 
-def _inside_crowded(edges: Integers, flat: Integers, owner: Integers, count: Integers) -> NDArray[np.bool_]:
-    """Sides at edges with more than two faces whose faces all belong to one region: not a border."""
-    low, high = np.full(len(edges), np.iinfo(np.int64).max), np.full(len(edges), -2)
-    np.minimum.at(low, flat, owner)
-    np.maximum.at(high, flat, owner)
-    return (count > 2)[flat] & (low == high)[flat]
+@kernel
+def _border_sides(side_edge, count, labels):  # pragma: no cover - compiled
+    """Sides (3 face + k) that are a border, in their order, and the face beyond each: FREE where there isn't exactly one other.
+
+    An edge with more than two faces is no border where all of them belong to one region.
+    """
+    first, last = np.full(len(count), FREE), np.full(len(count), FREE)
+    alike = np.ones(len(count), np.bool_)
+    for f in range(len(side_edge)):
+        for edge in side_edge[f]:
+            if first[edge] < 0:
+                first[edge] = f
+            alike[edge] &= labels[f] == labels[first[edge]]
+            last[edge] = f
+    sides, beyond, found = np.empty(side_edge.size, np.int64), np.empty(side_edge.size, np.int64), 0
+    for f in range(len(side_edge)):
+        for k in range(3):
+            edge = side_edge[f, k]
+            if labels[f] >= 0 and not (alike[edge] and count[edge] > 1):
+                sides[found] = 3 * f + k
+                beyond[found] = first[edge] + last[edge] - f if count[edge] == 2 else FREE
+                found += 1
+    return sides[:found], beyond[:found]
 
 
 def corner_neighbours(mesh: Mesh, labels: NDArray[np.int32], shared: Array) -> NDArray[np.bool_]:
@@ -103,12 +109,26 @@ def opposite_lengths(mesh: Mesh, borders: Borders, normals: Array) -> Array:
         flat = mesh.vertices[ends] @ tangent_frame(normals[a]).T  # (B, 2, 2)
         way = flat[:, 1] - flat[:, 0]
         way /= np.maximum(np.linalg.norm(way, axis=1), 1e-300)[:, None]
-        inner = beyond != FREE
-        weight = np.clip((-way[inner] @ way.T - ASIDE) / (FACING - ASIDE), 0, 1)
-        across = weight @ length
-        share = np.divide(weight[:, ~inner] @ length[~inner], across, out=np.zeros_like(across), where=across > 1e-9 * length.sum())
-        np.add.at(result[a], beyond[inner], length[inner] * share)
+        _add_opposite(way, beyond, length, 1e-9 * length.sum(), result[a])
     return result
+
+
+@kernel
+def _add_opposite(way, beyond, length, least, result):  # pragma: no cover - compiled
+    """Add the length of every edge with a neighbour beyond it, times the free share of the edges opposite to it."""
+    for i in range(len(way)):
+        if beyond[i] == FREE:
+            continue
+        across, free = 0.0, 0.0
+        for k in range(len(way)):
+            facing = -way[i, 0] * way[k, 0] - way[i, 1] * way[k, 1]
+            if facing > ASIDE:
+                weight = min((facing - ASIDE) / (FACING - ASIDE), 1.0) * length[k]
+                across += weight
+                if beyond[k] == FREE:
+                    free += weight
+        if across > least:
+            result[beyond[i]] += length[i] * free / across
 
 
 def tangent_frame(normal: Array) -> Array:
@@ -121,12 +141,8 @@ def tangent_frame(normal: Array) -> Array:
 
 def _outer_loop(ends: Integers, length: Array) -> NDArray[np.bool_]:
     """Edges of the longest connected loop; the others bound holes."""
-    _, at = np.unique(ends, return_inverse=True)
-    at = at.reshape(-1, 2)
-    size = int(at.max()) + 1
-    graph = coo_matrix((np.ones(len(at)), (at[:, 0], at[:, 1])), shape=(size, size))
-    _, loop = connected_components(graph, directed=False)
-    return loop[at[:, 0]] == np.argmax(np.bincount(loop[at[:, 0]], weights=length))
+    loop = joined(ends, int(ends.max()) + 1)[ends[:, 0]]
+    return loop == np.argmax(np.bincount(loop, weights=length))
 
 
 def _outside(points: Array) -> Array:

@@ -171,18 +171,47 @@ def _pairs_at(side_edge, count):  # pragma: no cover - compiled
 def components(faces: Integers) -> Integers:
     """Connected piece of each face (any shared edge counts), numbered from 0."""
     _, side_edge, count = edge_table(faces)
-    rows = np.repeat(np.arange(len(faces)), 3)
-    size = len(faces) + len(count)
-    graph = coo_matrix((np.ones(len(rows)), (rows, len(faces) + side_edge.ravel())), shape=(size, size))
-    _, group = connected_components(graph, directed=False)
-    return np.unique(group[: len(faces)], return_inverse=True)[1].ravel()
+    links = np.stack([np.repeat(np.arange(len(faces)), 3), len(faces) + side_edge.ravel()], axis=1)
+    return joined(links, len(faces) + len(count))[: len(faces)]
+
+
+@kernel
+def joined(links, n):  # pragma: no cover - compiled
+    """Connected piece of each of n things (n,) that are linked in pairs (L, 2); pieces are counted from 0 in the order of their first."""
+    above = np.arange(n)
+    for link in links:
+        a, b = link[0], link[1]
+        while above[a] != a:
+            above[a] = above[above[a]]
+            a = above[a]
+        while above[b] != b:
+            above[b] = above[above[b]]
+            b = above[b]
+        above[max(a, b)] = min(a, b)
+    piece, found = np.empty(n, np.int64), 0
+    for i in range(n):
+        if above[i] == i:
+            piece[i] = found
+            found += 1
+        else:
+            piece[i] = piece[above[i]]
+    return piece
 
 
 def areas(vertices: Array, faces: NDArray[np.integer]) -> Array:
     """Area of each face (F,)."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    (x, y, z), (u, v, w) = (b - a).T, (c - a).T
-    return np.sqrt((y * w - z * v) ** 2 + (z * u - x * w) ** 2 + (x * v - y * u) ** 2) / 2
+    return _areas_of(np.ascontiguousarray(vertices, np.float64), np.ascontiguousarray(faces, np.int64))
+
+
+@kernel
+def _areas_of(vertices, faces):  # pragma: no cover - compiled
+    area = np.empty(len(faces))
+    for f in range(len(faces)):
+        a, b, c = vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]]
+        x, y, z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+        u, v, w = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+        area[f] = np.sqrt((y * w - z * v) ** 2 + (z * u - x * w) ** 2 + (x * v - y * u) ** 2) / 2
+    return area
 
 
 def _turn(faces: Integers, flip: NDArray[np.bool_] | None) -> tuple[Integers, int]:

@@ -35,43 +35,59 @@ def face_sums(vertices: Array, faces: NDArray[np.integer]) -> Array:
 
 def sums_about(vertices: Array, faces: NDArray[np.integer], middle: Array, scale: float) -> Array:
     """The 54 numbers of some faces together (54,), in coordinates (x - middle) / scale."""
-    corners = (vertices[faces] - middle).reshape(-1, 3) / scale
-    sums = _sums_of(corners, np.arange(len(corners)).reshape(-1, 3))
-    return _added(sums, np.zeros(len(sums), np.int64), 1)[0]
+    return _sum_about(np.ascontiguousarray(vertices, np.float64), np.ascontiguousarray(faces, np.int64), middle, scale)
 
 
 @kernel
 def _sums_of(vertices, faces):  # pragma: no cover - compiled
-    sums, power, side = np.zeros((len(faces), SIZE)), np.ones((3, 5)), np.empty((2, 3))
+    sums, corners, power = np.zeros((len(faces), SIZE)), np.empty((3, 3)), np.ones((3, 5))
     for f in range(len(faces)):
-        a, m = faces[f, 0], sums[f]
-        for c in range(3):
-            side[0, c] = vertices[faces[f, 1], c] - vertices[a, c]
-            side[1, c] = vertices[faces[f, 2], c] - vertices[a, c]
-        twice = 0.0
-        for c in range(3):
-            d, e = (c + 1) % 3, (c + 2) % 3
-            m[NORMAL + c] = side[0, d] * side[1, e] - side[0, e] * side[1, d]
-            twice += m[NORMAL + c] * m[NORMAL + c]
-        area = np.sqrt(twice) / 2
-        m[AREA] = area
-        for v in faces[f]:
-            for c in range(3):
-                for degree in range(1, 5):
-                    power[c, degree] = power[c, degree - 1] * vertices[v, c]
-            for at in range(NORMAL):
-                m[at] += area / 3 * power[0, EXPONENT[at, 0]] * power[1, EXPONENT[at, 1]] * power[2, EXPONENT[at, 2]]
-        for c in range(3):
-            m[NORMAL + c] /= 2  # area times unit normal
-            middle = (vertices[a, c] + vertices[faces[f, 1], c] + vertices[faces[f, 2], c]) / 3
-            for d in range(3):
-                m[NORMAL_CENTRE + 3 * d + c] = middle
-        for c in range(3):
-            for d in range(3):
-                m[NORMAL_CENTRE + 3 * c + d] *= m[NORMAL + c]
-                if c <= d and area > 0:
-                    m[NORMAL2 + NORMAL2_AT[c, d]] = m[NORMAL + c] * m[NORMAL + d] / area
+        for k in range(3):
+            corners[k] = vertices[faces[f, k]]
+        _fill_sums(corners, power, sums[f])
     return sums
+
+
+@kernel
+def _sum_about(vertices, faces, middle, scale):  # pragma: no cover - compiled
+    total, one, corners, power = np.zeros(SIZE), np.empty(SIZE), np.empty((3, 3)), np.ones((3, 5))
+    for f in range(len(faces)):
+        for k in range(3):
+            for c in range(3):
+                corners[k, c] = (vertices[faces[f, k], c] - middle[c]) / scale
+        one[:] = 0
+        _fill_sums(corners, power, one)
+        for at in range(SIZE):
+            total[at] += one[at]
+    return total
+
+
+@kernel
+def _fill_sums(corners, power, m):  # pragma: no cover - compiled
+    """The 54 numbers of one face into m, which is all zero; power (3, 5) is scratch with ones first."""
+    a, b, g = corners[0], corners[1], corners[2]
+    twice = 0.0
+    for c in range(3):
+        d, e = (c + 1) % 3, (c + 2) % 3
+        m[NORMAL + c] = (b[d] - a[d]) * (g[e] - a[e]) - (b[e] - a[e]) * (g[d] - a[d])
+        twice += m[NORMAL + c] * m[NORMAL + c]
+    area = np.sqrt(twice) / 2
+    m[AREA] = area
+    for v in corners:
+        for c in range(3):
+            for degree in range(1, 5):
+                power[c, degree] = power[c, degree - 1] * v[c]
+        for at in range(NORMAL):
+            m[at] += area / 3 * power[0, EXPONENT[at, 0]] * power[1, EXPONENT[at, 1]] * power[2, EXPONENT[at, 2]]
+    for c in range(3):
+        m[NORMAL + c] /= 2  # area times unit normal
+        for d in range(3):
+            m[NORMAL_CENTRE + 3 * d + c] = (a[c] + b[c] + g[c]) / 3
+    for c in range(3):
+        for d in range(3):
+            m[NORMAL_CENTRE + 3 * c + d] *= m[NORMAL + c]
+            if c <= d and area > 0:
+                m[NORMAL2 + NORMAL2_AT[c, d]] = m[NORMAL + c] * m[NORMAL + d] / area
 
 
 def add_up(sums: Array, label: NDArray[np.integer]) -> Array:

@@ -10,11 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, QhullError
 
-from app.geometry.cleaning import areas, face_pairs
+from app.geometry.cleaning import areas, face_pairs, joined
 from app.geometry.compiled import kernel
 from app.geometry.tool import Array
 
@@ -97,10 +95,7 @@ def _put_back(whole: Surface, apart: _Apart) -> Surface:
 
 def connected(group: NDArray[np.integer], pairs: Integers) -> Integers:
     """Number of the connected piece of equal `group` that each face lies in."""
-    same = pairs[group[pairs[:, 0]] == group[pairs[:, 1]]]
-    n = len(group)
-    graph = coo_matrix((np.ones(len(same)), (same[:, 0], same[:, 1])), shape=(n, n))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
+    return joined(pairs[group[pairs[:, 0]] == group[pairs[:, 1]]], len(group))
 
 
 def cut_by_plane(surface: Surface, region: int, normal: Array, offset: float, ahead: NDArray[np.bool_] | None = None) -> Surface:

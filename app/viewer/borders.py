@@ -42,7 +42,8 @@ def find_lines(tool: Tool, lift: float) -> Lines:
     at_border[borders.ends] = True
     a, b, c = at_border[tool.mesh.faces].T
     lifted = tool.mesh.vertices + lift * vertex_normals(tool.mesh, tool.mesh.faces[(tool.labels >= 0) & (a | b | c)])
-    every = np.unique(np.sort(borders.ends, axis=1), axis=0)
+    low, high, total = borders.ends.min(axis=1), borders.ends.max(axis=1), len(lifted)
+    every = np.stack(np.divmod(np.unique(low * total + high), total), axis=1)
     return Lines(lifted[every], tuple(lifted[borders.ends[borders.region == r]] for r in range(tool.n)))
 
 
@@ -53,5 +54,7 @@ def size(tool: Tool) -> float:
 
 def part_of(mesh: Mesh, faces: NDArray[np.int32]) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
     """Vertices and faces of a part of the mesh on its own, as the browser wants them."""
-    used, index = np.unique(faces, return_inverse=True)
-    return mesh.vertices[used].astype(np.float32), index.reshape(-1, 3).astype(np.uint32)
+    used = np.zeros(len(mesh.vertices), bool)
+    used[faces] = True
+    number = np.cumsum(used, dtype=np.uint32) - np.uint32(1)
+    return mesh.vertices[used].astype(np.float32), number[faces]
