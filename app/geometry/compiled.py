@@ -7,9 +7,9 @@ as old as soon as one of the files with compiled functions in the same folder is
 
 import hashlib
 from collections.abc import Callable
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, TypeVar, overload
 
 import numba as nb
 from numba.core import caching  # its classes for extending the cache aren't documented; tests/geometry/test_compiled.py guards this
@@ -18,9 +18,19 @@ F = TypeVar("F", bound=Callable[..., Any])
 MARK = b"@kernel"
 
 
-def kernel(function: F) -> F:
-    """Compile on first use, or load what was compiled from the same sources."""
-    compiled: Any = nb.njit(function)
+@overload
+def kernel(function: F) -> F: ...
+
+
+@overload
+def kernel(**options: Any) -> Callable[[F], F]: ...
+
+
+def kernel(function: Any = None, **options: Any) -> Any:
+    """Compile on first use, or load what was compiled from the same sources; options are those of `numba.njit`."""
+    if function is None:
+        return partial(kernel, **options)
+    compiled: Any = nb.njit(**options)(function)
     compiled._cache = _FolderCache(function)
     return compiled
 

@@ -7,10 +7,10 @@ more than the search.
 
 from typing import NamedTuple
 
-import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from app.geometry.compiled import kernel
 from app.geometry.tool import Array
 from app.sequencing.block import LOW, fill
 from app.sequencing.forms import BETWEEN, Form, Ints, Shape, step_costs, weigh
@@ -56,7 +56,7 @@ class Answer(NamedTuple):
     error: float  # of the costs-to-go
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def weighed(p: Prepared, w: Array, extra: Array) -> Form:
     """The cost under weights w (n + m,); `extra` (N, 2^N) is what undeclared columns add, (0, 0) without."""
     f, c = p.factors.shape
@@ -72,7 +72,7 @@ def weighed(p: Prepared, w: Array, extra: Array) -> Form:
     return weigh(p.shape, mix, p.pair, weight, p.before, first, extra)
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def laid_out(p: Prepared, form: Form):  # type: ignore[no-untyped-def]
     """The form as the block kernel reads it."""
     high = form.start.shape[1] - LOW
@@ -80,7 +80,7 @@ def laid_out(p: Prepared, form: Form):  # type: ignore[no-untyped-def]
     return lay_out(form, high - top, top, p.row, p.flip)
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def answer(p: Prepared, w: Array, extra: Array, after: Array, v: Single, filled: bool, most: int) -> Answer:
     """The cheapest sequence.
 
@@ -113,7 +113,7 @@ def answer(p: Prepared, w: Array, extra: Array, after: Array, v: Single, filled:
     return Answer(first, region, cost, to, end, complete, to_go, order, ways[0], ways[1], scale, error)
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def lowest_cost(form: Form, after: Array, v: Single) -> float:
     """Cheapest cost of a complete sequence, to single precision."""
     n = form.start.shape[1]
@@ -127,7 +127,7 @@ def lowest_cost(form: Form, after: Array, v: Single) -> float:
     return least
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def magnitude(form: Form) -> float:
     """What no sum of absolute costs along a sequence exceeds: rounding errors are measured against it."""
     f, n = form.start.shape
@@ -156,7 +156,7 @@ def magnitude(form: Form) -> float:
     return total
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _largest(form: Form, i: int, a: int, mean: Array) -> float:
     """What |F_i| of region a can't exceed without values of sets; `mean` (Q,) is what no mean exceeds."""
     n = form.start.shape[1]

@@ -5,13 +5,13 @@ A state s is a bit mask of finished regions. V(s), the cheapest cost from s to t
     V(s) = min over the regions a that are not in s of   c(s, a) + V(s | a)
 
 filled in from the full set downwards, so that every V(s | a) is known when V(s) asks for it; costs may be negative.
-`kernels.lowest_to_go` is just that, for a table of costs. This is the same, computing the costs on the way, sixty-four states
+`kernels.lowest_to_go` is just that, for a table of costs. This is the same, computing the costs on the way, 128 states
 at a time. A block is the states that share all but their low bits:
 
     for each block, from the last to the first:
         of the state:     the means of what is finished, and what depends on the set only
-        high regions a:   best = min(best, c(lanes, a) + V[the block with a])      64 lanes at once: they lie side by side
-        low regions a:    c(lanes, a), and V inside the block, lane by lane from the last
+        high regions a:   best = min(best, c(lanes, a) + V[the block with a])      all lanes at once: they lie side by side
+        low regions a:    c(lanes, a), then V inside the block, lane by lane from the last
         V[block] = best + what depends on the set only
 
 Costs come from the tables of `rows`, each for some of the bits. Superblocks (all blocks with the same topmost bits) that hold
@@ -26,24 +26,25 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 
+from app.geometry.compiled import kernel
 from app.sequencing.rows import LANES, LOW, Rows, Single, count_bits, first_passed
 
-SMALLEST = LOW + 1  # regions; fewer are left to `nearly`
+SMALLEST = LOW  # regions; fewer are left to `nearly`
 FAST = {"nnan", "nsz", "contract", "arcp", "reassoc"}  # infinities stay: they mark what is not allowed
 
 
 class Scratch(NamedTuple):
     """Where one block is worked out."""
 
-    mean: Single  # (Q, 64) at least two rows
-    state: Single  # (F, 64) what depends on the set only
+    mean: Single  # (Q, LANES) at least two rows
+    state: Single  # (F, LANES) what depends on the set only
     fixed: Single  # (F, N) what the high bits add for each region
-    value: Single  # (F, 64) of one region
-    low: Single  # (6, 64) cost of each low region
-    best: Single  # (64,) without what depends on the set only
+    value: Single  # (F, LANES) of one region
+    low: Single  # (LOW, LANES) cost of each low region
+    best: Single  # (LANES,) without what depends on the set only
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _scratch(rows: Rows) -> Scratch:
     f, n = rows.middle.shape[0], rows.middle.shape[2]
     return Scratch(
@@ -52,7 +53,7 @@ def _scratch(rows: Rows) -> Scratch:
     )  # fmt: skip
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def fill(rows: Rows, sets: Single, v: Single) -> None:
     """V of every state, one thread; `sets` (G', 2^N) holds the values that depend on a set only."""
     scratch = _scratch(rows)
@@ -60,7 +61,7 @@ def fill(rows: Rows, sets: Single, v: Single) -> None:
         _fill_superblock(rows, sets, v, top, scratch)
 
 
-@nb.njit(cache=True, nogil=True, parallel=True)
+@kernel(nogil=True, parallel=True)
 def fill_parallel(rows: Rows, sets: Single, v: Single) -> None:
     """The same; superblocks with equally many topmost regions at the same time."""
     tops = rows.top.shape[1]
@@ -75,12 +76,13 @@ def fill_parallel(rows: Rows, sets: Single, v: Single) -> None:
             _fill_superblock(rows, sets, v, layer[i], _scratch(rows))
 
 
-@nb.njit(cache=True, nogil=True, fastmath=FAST, error_model="numpy", _nrt=False)
+@kernel(nogil=True, fastmath=FAST, error_model="numpy", _nrt=False)
 def _fill_superblock(rows: Rows, sets: Single, v: Single, top: int, scratch: Scratch) -> None:
     """V of every state whose topmost bits are `top`; those with more of them are filled in already."""
     f, middles, n = rows.middle.shape
     mean, state, fixed, value, low, best = scratch
-    simple = len(rows.weight) == 0 and len(rows.extra) == 0 and not rows.ranked[0] and len(rows.of) <= 2
+    plain = len(rows.extra) == 0 and not rows.ranked.any() and not rows.stated[1:].any() and len(rows.of) == 2
+    simple, paired = plain and len(rows.weight) == 0, plain and 0 < len(rows.weight) <= 2
     full, shift = np.int64((1 << n) - 1), count_bits(middles - 1)
     for m in range(middles - 1, -1, -1):
         base = ((np.int64(top) << shift) | m) << LOW  # the block's first state: no low region finished
@@ -103,13 +105,16 @@ def _fill_superblock(rows: Rows, sets: Single, v: Single, top: int, scratch: Scr
             if a >= LOW and simple:
                 _simple_minimum(rows, fixed[0, a], rows.lane[0, a, level], mean, a, after, best)
                 continue
-            _costs(rows, fixed, mean, state, level, a, above, base, value, out)
+            if paired:
+                _with_products(rows, fixed, level, mean, a, out)
+            else:
+                _costs(rows, fixed, mean, state, level, a, above, base, value, out)
             if a >= LOW:
                 _take_minimum(best, out, after)
         _inside(low, best, v[base : base + LANES], state[0], base + LANES - 1 == full)
 
 
-@nb.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
+@kernel(nogil=True, fastmath=FAST, inline="always")
 def _of_state(rows: Rows, sets: Single, top: int, m: int, base: int, above: int, full: int, mean: Single, state: Single) -> None:
     """Means of the lanes, and the state part of every F."""
     for k in range(len(rows.sum_lane)):
@@ -131,13 +136,13 @@ def _of_state(rows: Rows, sets: Single, top: int, m: int, base: int, above: int,
                 _add_multiple(out, weight, sets[rows.row[k], base : base + LANES])
 
 
-@nb.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
+@kernel(nogil=True, fastmath=FAST, inline="always")
 def _add_multiple(out: Single, factor: np.float32, values: Single) -> None:
     for x in range(LANES):
         out[x] += factor * values[x]
 
 
-@nb.njit(cache=True, nogil=True, inline="always")
+@kernel(nogil=True, inline="always")
 def _level(rows: Rows, base: int, a: int) -> int:
     """Which tests the high bits pass, two bits per cascade."""
     out = 0
@@ -146,7 +151,7 @@ def _level(rows: Rows, base: int, a: int) -> int:
     return out
 
 
-@nb.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
+@kernel(nogil=True, fastmath=FAST, inline="always")
 def _simple_minimum(rows: Rows, start: np.float32, lane: Single, mean: Single, a: int, after: Single, best: Single) -> None:
     """Cost and minimum in one pass, for the usual case: no product, no table, at most two distances from a mean."""
     slope, own, one = rows.slope[0, 0], rows.own[0, a], mean[rows.of[0]]
@@ -156,20 +161,45 @@ def _simple_minimum(rows: Rows, start: np.float32, lane: Single, mean: Single, a
         best[x] = cost if cost < best[x] else best[x]
 
 
-@nb.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
+@kernel(nogil=True, fastmath=FAST, inline="always")
+def _with_products(rows: Rows, fixed: Single, level: int, mean: Single, a: int, out: Single) -> None:
+    """Cost in one pass, for one or two products of factors that depend on pairs of regions and two distances from means."""
+    (i, j), (k, m), slope = rows.pair[0], rows.pair[-1], rows.slope
+    weight, other_weight = rows.weight[0], rows.weight[-1] if len(rows.weight) > 1 else np.float32(0)
+    own, one, other, two = rows.own[0, a], mean[rows.of[0]], rows.own[1, a], mean[rows.of[1]]
+    lane, lane_i, lane_j = rows.lane[0, a, level], rows.lane[i, a, level], rows.lane[j, a, level]
+    lane_k, lane_m = rows.lane[k, a, level], rows.lane[m, a, level]
+    for x in range(LANES):
+        near, far = abs(own - one[x]), abs(other - two[x])
+        factor_i = fixed[i, a] + lane_i[x] + slope[i, 0] * near + slope[i, 1] * far
+        factor_j = fixed[j, a] + lane_j[x] + slope[j, 0] * near + slope[j, 1] * far
+        factor_k = fixed[k, a] + lane_k[x] + slope[k, 0] * near + slope[k, 1] * far
+        factor_m = fixed[m, a] + lane_m[x] + slope[m, 0] * near + slope[m, 1] * far
+        cost = fixed[0, a] + lane[x] + slope[0, 0] * near + slope[0, 1] * far
+        out[x] = cost + weight * factor_i * factor_j + other_weight * factor_k * factor_m
+
+
+@kernel(nogil=True, fastmath=FAST, inline="always")
 def _take_minimum(best: Single, cost: Single, after: Single) -> None:
     for x in range(len(best)):
         total = cost[x] + after[x]
         best[x] = total if total < best[x] else best[x]
 
 
-@nb.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
+@kernel(nogil=True, fastmath=FAST, inline="always")
 def _sum_of(rows: Rows, i: int, start: np.float32, lane: Single, mean: Single, above: int, a: int, out: Single) -> None:
     """F_i without its state part, for all lanes."""
     slope, own, one = rows.slope[i, 0], rows.own[0, a], mean[rows.of[0]]
     other_slope, other, two = rows.slope[i, 1], rows.own[1, a], mean[rows.of[1]]
-    for x in range(LANES):
-        out[x] = start + lane[x] + slope * abs(own - one[x]) + other_slope * abs(other - two[x])
+    if slope != 0 and other_slope != 0:
+        for x in range(LANES):
+            out[x] = start + lane[x] + slope * abs(own - one[x]) + other_slope * abs(other - two[x])
+    elif slope != 0:
+        for x in range(LANES):
+            out[x] = start + lane[x] + slope * abs(own - one[x])
+    else:
+        for x in range(LANES):
+            out[x] = start + lane[x] + other_slope * abs(other - two[x])
     for t in range(2, len(rows.of)):
         slope, own, m = rows.slope[i, t], rows.own[t, a], mean[rows.of[t]]
         if slope != 0:
@@ -180,7 +210,7 @@ def _sum_of(rows: Rows, i: int, start: np.float32, lane: Single, mean: Single, a
             out[x] += rows.rank[i, above + rows.ones[x], a]
 
 
-@nb.njit(cache=True, nogil=True, fastmath=FAST, inline="always")
+@kernel(nogil=True, fastmath=FAST, inline="always")
 def _costs(
     rows: Rows, fixed: Single, mean: Single, state: Single, level: int, a: int, above: int, base: int, value: Single, out: Single
 ) -> None:
@@ -198,26 +228,14 @@ def _costs(
         _add_multiple(out, np.float32(1), rows.extra[a, base : base + LANES])
 
 
-@nb.njit(cache=True, nogil=True, fastmath=FAST, _nrt=False)
+@kernel(nogil=True, fastmath=FAST, _nrt=False)
 def _inside(low: Single, best: Single, v: Single, state: Single, full: bool) -> None:
-    """The regions of the low bits, whose successors lie in the block itself: eight lanes at a time from the last.
-
-    Once eight lanes are final they serve the lanes without bit 3, sixteen those without bit 4, thirty-two those without bit 5.
-    """
-    for at in range(LANES - 8, -1, -8):
-        v7 = best[at + 7] + state[at + 7]
-        if full and at == LANES - 8:
-            v7 = np.float32(0)
-        v6 = min(best[at + 6], low[0, at + 6] + v7) + state[at + 6]
-        v5 = min(best[at + 5], low[1, at + 5] + v7) + state[at + 5]
-        v3 = min(best[at + 3], low[2, at + 3] + v7) + state[at + 3]
-        v4 = min(best[at + 4], min(low[0, at + 4] + v5, low[1, at + 4] + v6)) + state[at + 4]
-        v2 = min(best[at + 2], min(low[0, at + 2] + v3, low[2, at + 2] + v6)) + state[at + 2]
-        v1 = min(best[at + 1], min(low[1, at + 1] + v3, low[2, at + 1] + v5)) + state[at + 1]
-        v0 = min(min(best[at], low[0, at] + v1), min(low[1, at] + v2, low[2, at] + v4)) + state[at]
-        v[at], v[at + 1], v[at + 2], v[at + 3] = v0, v1, v2, v3
-        v[at + 4], v[at + 5], v[at + 6], v[at + 7] = v4, v5, v6, v7
-        for a in range(3, LOW):
-            bit = 1 << a
-            if at & (2 * bit - 1) == bit:  # `bit` lanes from here on are final
-                _take_minimum(best[at - bit : at], low[a, at - bit : at], v[at : at + bit])
+    """The low regions, whose successors lie in the block itself: the recurrence as it stands, lane by lane from the last."""
+    for x in range(LANES - 1, -1, -1):
+        lowest = best[x]
+        for a in range(LOW):
+            if not x >> a & 1:
+                lowest = min(lowest, low[a, x] + v[x | 1 << a])
+        v[x] = lowest + state[x]
+        if full and x == LANES - 1:
+            v[x] = np.float32(0)

@@ -20,10 +20,10 @@ Only regions still to be ordered (`free`) are numbered here; finished and skippe
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from app.geometry.compiled import kernel
 from app.geometry.tool import Array
 from app.sequencing.gaps import box_gap, hull_gaps
 from app.sequencing.structure import Between, Declaration, FirstTouch, Gap, MeanStep, Pairwise, Rank, Undeclared
@@ -193,7 +193,7 @@ def _same(a: Any, b: Any) -> bool:
     return a is b
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def weigh(shape: Shape, mix: Array, pair: Ints, weight: Array, before: Ints, first: Array, extra: Array) -> Form:
     """The form whose F are the mixtures `mix` (F, n) of the columns."""
     f, c = mix.shape
@@ -220,14 +220,14 @@ def weigh(shape: Shape, mix: Array, pair: Ints, weight: Array, before: Ints, fir
     )  # fmt: skip
 
 
-@nb.njit(cache=True, nogil=True, inline="always")
+@kernel(nogil=True, inline="always")
 def _add_multiple(out: Array, factor: float, values: Array) -> None:
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
             out[i, j] += factor * values[i, j]
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def set_value(v: SetValues, g: int, s: int) -> float:
     """Value g of the state s."""
     inside = v.done.copy()
@@ -248,7 +248,7 @@ def set_value(v: SetValues, g: int, s: int) -> float:
     return box_gap(inside, v.low[g], v.high[g], v.area[g], v.kind[g] == PLAIN)
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def step_costs(form: Form, s: int, out: Array) -> None:
     """Cost of every region after the state s in float64, infinite where finished or not allowed yet.
 
@@ -259,13 +259,13 @@ def step_costs(form: Form, s: int, out: Array) -> None:
         for a in range(n):
             out[a] = form.first[a] if form.before[a] == 0 else np.inf
         return
-    count, members = 0, np.empty(n, np.int64)
+    count, members, scratch = 0, np.empty(n, np.int64), np.empty(len(form.total) + 2 * f)
     for b in range(n):
         if s >> b & 1:
             members[count] = b
             count += 1
-    members = members[:count]
-    mean, state, value = np.empty(len(form.total)), np.empty(f), np.empty(f)
+    members, mean = members[:count], scratch[2 * f :]
+    state, value = scratch[:f], scratch[f : 2 * f]
     _of_state(form, s, members, mean, state)
     for a in range(n):
         if s >> a & 1 or form.before[a] & ~s:
@@ -284,7 +284,7 @@ def step_costs(form: Form, s: int, out: Array) -> None:
             out[a] += form.extra[a, s]
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _of_state(form: Form, s: int, members: Ints, mean: Array, state: Array) -> None:
     """Means over what is finished, and what every F adds whichever region comes next."""
     state[:] = 0.0
@@ -304,7 +304,7 @@ def _of_state(form: Form, s: int, members: Ints, mean: Array, state: Array) -> N
             state[i] += form.state[i, g] * value
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _of_region(form: Form, i: int, a: int, members: Ints, mean: Array) -> float:
     """What F_i is for region a, without touch and what depends on the state only."""
     x = form.start[i, a] + form.rank[i, len(members), a]
@@ -315,7 +315,7 @@ def _of_region(form: Form, i: int, a: int, members: Ints, mean: Array) -> float:
     return x
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def first_test(form: Form, u: int, a: int, members: Ints) -> int:
     """The first test of cascade u that a finished region passes for region a."""
     for k in range(form.reached[u, a]):

@@ -1,13 +1,13 @@
 """How full the bounding box or the convex hull of a set of regions is, compiled."""
 
-import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from app.geometry.compiled import kernel
 from app.geometry.tool import Array
 
 
-@nb.njit(cache=True)
+@kernel
 def box_gaps(inside: NDArray[np.bool_], low: Array, high: Array, area: Array, plain: bool) -> Array:
     """1 - area(S) / area(box of S) for each row S of `inside` (M, N); 0 for at most one region.
 
@@ -20,7 +20,7 @@ def box_gaps(inside: NDArray[np.bool_], low: Array, high: Array, area: Array, pl
     return out
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def box_gap(inside: NDArray[np.bool_], low: Array, high: Array, area: Array, plain: bool) -> float:
     """`box_gaps` of one set."""
     x0, y0, x1, y1 = np.inf, np.inf, -np.inf, -np.inf
@@ -39,7 +39,7 @@ def box_gap(inside: NDArray[np.bool_], low: Array, high: Array, area: Array, pla
     return 1 - own / box if box > 0 else 0.0  # walls have no area in plan view
 
 
-@nb.njit(cache=True)
+@kernel
 def hull_gaps(inside: NDArray[np.bool_], low: Array, high: Array, area: Array) -> Array:
     """1 - area(S) / area of the convex hull of the corners of S for each row S of `inside` (M, N); 0 for at most one region."""
     m, n = inside.shape
@@ -78,13 +78,13 @@ def hull_gaps(inside: NDArray[np.bool_], low: Array, high: Array, area: Array) -
     return out
 
 
-@nb.njit(cache=True)
+@kernel
 def _turn(points: Array, a: int, b: int, c: int) -> float:
     """Positive when the way from a over b to c turns left."""
     return (points[b, 0] - points[a, 0]) * (points[c, 1] - points[a, 1]) - (points[b, 1] - points[a, 1]) * (points[c, 0] - points[a, 0])
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def box_table(
     low: Array, high: Array, area: Array, plain: bool, always: NDArray[np.bool_], free: NDArray[np.int64], out: NDArray[np.float32]
 ) -> None:
@@ -115,12 +115,12 @@ def box_table(
         out[s] = 1 - (own0 + first[4][i] + second[4][j]) / box if box > 0 else 0.0
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _ranks(values: Array) -> NDArray[np.int64]:
     return np.searchsorted(np.unique(values), values)
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _box_areas(low: Array, high: Array, area: Array, plain: bool, sides: tuple[NDArray[np.int64], ...]) -> Array:
     """Area by the ranks of the left, lower, right and upper side."""
     xs, ys, xe, ye = np.unique(low[:, 0]), np.unique(low[:, 1]), np.unique(high[:, 0]), np.unique(high[:, 1])
@@ -142,7 +142,7 @@ def _box_areas(low: Array, high: Array, area: Array, plain: bool, sides: tuple[N
     return out
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _common(low: float, high: float, start: float, end: float) -> float:
     """Share of low..high inside start..end; without extent it is inside or not."""
     common = min(high, end) - max(low, start)
@@ -151,7 +151,7 @@ def _common(low: float, high: float, start: float, end: float) -> float:
     return 0.0 if common < 0 else 1.0
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _half_sides(sides: tuple[NDArray[np.int64], ...], area: Array, regions: NDArray[np.int64]):  # type: ignore[no-untyped-def]
     """Ranks of the sides, area and size of every subset of a few regions."""
     size = 1 << len(regions)

@@ -5,10 +5,10 @@ They depend on the region worked on last, so a state is a set and its last regio
 
 from dataclasses import dataclass
 
-import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from app.geometry.compiled import kernel
 from app.geometry.tool import Array
 from app.sequencing.constraints import Resolved
 from app.sequencing.features import Feature
@@ -58,7 +58,7 @@ def after_last(features: tuple[LastFeature, ...], w: Array, resolved: Resolved) 
     return np.ascontiguousarray(np.concatenate([between[np.ix_(free, free)], row[None, free]]))  # compiled code takes no other
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def costs_to_go_by_last(form: Form, after: Array) -> NDArray[np.float32]:
     """V of every state and last region, (2^N * N,)."""
     n = form.start.shape[1]

@@ -7,16 +7,16 @@ the next costs) is answered on this graph, which is small unless nearly everythi
 A node is a state, or a state and the region worked on last where costs depend on it. Its edges are stored side by side.
 """
 
-# pyright: reportReturnType=false
+# pyright: reportReturnType=false, reportArgumentType=false
 # Compiled code: the checker can't follow the types of the growing arrays.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from app.geometry.compiled import kernel
 from app.geometry.tool import Array
 from app.sequencing.forms import Form, Ints, step_costs
 
@@ -113,7 +113,7 @@ def explore(form: Form, v: NDArray[np.float32], after_last: Array, limit: float,
     return Nearly(first, region, cost, to, end, n, complete, lowest_to_end(first, cost, to, end))
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def explore_compiled(
     form: Form, v: NDArray[np.float32], after_last: Array, limit: float, most: int, widest: int
 ) -> tuple[Ints, Ints, Array, Ints, int, bool]:
@@ -165,7 +165,7 @@ def explore_compiled(
     return np.array(first), region[:edges].copy(), cost[:edges].copy(), to[:edges].copy(), end, True
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _cheapest(keys: Ints, v: NDArray[np.float32], to: Ints, reach: Array, widest: int) -> Ints:
     """The keys with the cheapest ways through them, in order."""
     through = np.full(len(keys), np.inf)
@@ -175,7 +175,7 @@ def _cheapest(keys: Ints, v: NDArray[np.float32], to: Ints, reach: Array, widest
     return keys[np.sort(np.argsort(through, kind="mergesort")[:widest])]
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _only(keys: Ints, first: list[int], node: int, begin: int, region: Ints, cost: Array, to: Ints, reach: Array) -> int:
     """Drop the edges of the nodes from `node` on that lead to none of the keys; returns how many edges there are then."""
     read, write = begin, begin
@@ -189,14 +189,14 @@ def _only(keys: Ints, first: list[int], node: int, begin: int, region: Ints, cos
     return write
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _longer(values, size):  # type: ignore[no-untyped-def]
     out = np.empty(size, values.dtype)
     out[: len(values)] = values
     return out
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def lowest_to_end(first: Ints, cost: Array, to: Ints, end: int) -> Array:
     """Cheapest cost from every node to a final one."""
     v = np.full(max(len(first) - 1, end), np.inf)
@@ -207,7 +207,7 @@ def lowest_to_end(first: Ints, cost: Array, to: Ints, end: int) -> Array:
     return v
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _add(sum_: Counts, more: Counts) -> None:
     """sum_ += more, 128 bits: 28! fits."""
     low = sum_[1] + more[1]
@@ -215,7 +215,7 @@ def _add(sum_: Counts, more: Counts) -> None:
     sum_[1] = low
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def ways_to_end(first: Ints, cost: Array, to: Ints, v: Array, end: int, tolerance: float) -> Counts:
     """Number of cheapest ways on from every node."""
     ways = np.zeros((len(v), 2), np.uint64)
@@ -227,20 +227,20 @@ def ways_to_end(first: Ints, cost: Array, to: Ints, v: Array, end: int, toleranc
     return ways
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def lowest_order(first: Ints, region: Ints, cost: Array, to: Ints, v: Array, end: int, tolerance: float) -> Ints:
     """The cheapest sequence with the lowest region ids; empty when there is none."""
-    order, node = [0][:0], 0
+    order, length, node = np.empty(64, np.int64), 0, 0
     while node < end and v[0] < np.inf:
         for e in range(first[node], first[node + 1]):
             if cost[e] + v[to[e]] <= v[node] + tolerance:
-                order.append(region[e])
-                node = to[e]
+                order[length] = region[e]
+                length, node = length + 1, to[e]
                 break
-    return np.array(order)
+    return order[:length].copy()
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _least_end(first: Ints, region: Ints, cost: Array, to: Ints, v: Array, end: int, penalty: Array, tolerance: float) -> Array:
     """Least penalty of the last region over the cheapest ways on from every node."""
     best = np.full(len(v), np.inf)
@@ -251,7 +251,7 @@ def _least_end(first: Ints, region: Ints, cost: Array, to: Ints, v: Array, end: 
     return best
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _classes(first: Ints, cost: Array, to: Ints, end: int, k: int, tolerance: float) -> tuple[Array, Counts, Ints]:
     """The k lowest distinct totals from every node: a k-way merge of the sorted lists of its successors.
 

@@ -12,10 +12,10 @@ the given sequence's always, and the count is of those (`Nearly.complete`).
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from app.geometry.compiled import kernel
 from app.geometry.tool import Array
 from app.sequencing.answer import ROUNDING, magnitude
 from app.sequencing.block import SMALLEST
@@ -187,7 +187,7 @@ def _way_to(graph: Nearly, lasts: Ints, node: int, b: int) -> Iterator[int]:
         yield a
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _last_regions(first: Ints, region: Ints, to: Ints, to_go: Array, end: int) -> Ints:
     """Bit mask of the regions that sequences from each node may end with."""
     out = np.zeros(len(first), np.int64)

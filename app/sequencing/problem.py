@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from app.errors import IncompleteSequence, InvalidInput
 from app.geometry.tool import Array, RegionGraph, region_letters
+from app.sequencing import kernels
 from app.sequencing.features import (
     DEFAULT_INTERACTIONS,
     Feature,
@@ -109,9 +110,15 @@ class SequencingProblem:
         extra = [np.concatenate([[f.start[order[0]]], f.between[order[:-1], order[1:]]]) for f in self.last]
         return np.column_stack([steps, *extra]) if extra else steps
 
+    def sums_of(self, order: Sequence[int]) -> Array:
+        """Features added along an order that may leave regions out, (n + m,)."""
+        if "tensor" in self.kept and not self.last:
+            return kernels.sums_along(self.kept["tensor"], np.array(order, np.int64))
+        return np.add.reduce(self.steps_of(order))
+
     def cost_of(self, w: Array, order: Sequence[int]) -> float:
         """Cost of an order that may leave regions out."""
-        return float(self.check_weights(w) @ np.add.reduce(self.steps_of(order)))
+        return float(self.check_weights(w) @ self.sums_of(order))
 
     def feature_sum(self, sequence: Sequence[int]) -> Array:
         """Phi(xi), shape (n + m,): features added along the sequence."""
@@ -124,7 +131,7 @@ class SequencingProblem:
     def check_weights(self, w: Array) -> Array:
         """w as a float64 vector with one finite entry per column."""
         w = np.asarray(w, np.float64)
-        if w.shape != (len(self.columns),) or not np.isfinite(w).all():
+        if w.shape != (len(self.columns),) or not all(np.isfinite(w).tolist()):  # quicker than numpy for so few
             raise InvalidInput(f"Expected {len(self.columns)} finite weights, one per feature and interaction.")
         return w
 

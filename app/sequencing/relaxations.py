@@ -6,16 +6,16 @@ Each takes prices (Lagrange multipliers) and returns its lowest value with what 
 # pyright: reportArgumentType=false, reportPossiblyUnboundVariable=false
 # Compiled code: the checker takes elements of arrays for arrays.
 
-import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from app.geometry.compiled import kernel
 from app.geometry.tool import Array
 
 Ints = NDArray[np.int64]
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy")
 def cheapest_pairs(ends: Ints, change: Array, bits: Array, first: Ints, last: Ints, chosen: Array) -> float:
     """The least sum over pairs when each pair chooses its two positions for itself.
 
@@ -45,7 +45,7 @@ def cheapest_pairs(ends: Ints, change: Array, bits: Array, first: Ints, last: In
     return total
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy")
 def cheapest_chain(price: Array, between: Array, start: Array, regions: Ints) -> float:
     """The cheapest choice of a region for every position when only neighbours in the order count.
 
@@ -72,7 +72,7 @@ def cheapest_chain(price: Array, between: Array, start: Array, regions: Ints) ->
     return total
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy")
 def cheapest_sets(
     price: Array, area: Array, fixed: NDArray[np.int8], boxes: Array, last: Ints, low: Array, chosen: NDArray[np.bool_]
 ) -> None:
@@ -109,7 +109,7 @@ def cheapest_sets(
                     chosen[size, region[i]] = True
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy")
 def _fill(price: Array, area: Array, fixed: NDArray[np.int8], slope: float, need: int, order: Ints, key: Array, region: Ints) -> float:
     """Prices of the regions that must be in a set, and of the `need` cheapest free ones, which `region` then starts with."""
     held, value = 0, 0.0

@@ -10,10 +10,10 @@ make these choices agree with those of the other relaxed problems.
 
 from typing import NamedTuple
 
-import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from app.geometry.compiled import kernel
 from app.geometry.tool import Array
 
 Ints = NDArray[np.int64]
@@ -45,7 +45,7 @@ class Walk(NamedTuple):
     high: Ints  # (2, P + 1)
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy")
 def cheapest_walk(w: Walk, price: Array, bits: Array, value: Array, regions: Ints, finished: Ints) -> float:
     """Cost of the cheapest walk.
 
@@ -84,7 +84,7 @@ def cheapest_walk(w: Walk, price: Array, bits: Array, value: Array, regions: Int
     return value[count, end[0], end[1]]
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath={"nnan", "nsz"})
+@kernel(nogil=True, error_model="numpy", fastmath={"nnan", "nsz"})
 def _move(before: Array, local: Array, paid: float, after: Array) -> None:
     """Lower `after` to what a first or last step reaches."""
     for i in range(len(before)):
@@ -92,7 +92,7 @@ def _move(before: Array, local: Array, paid: float, after: Array) -> None:
             after[i, k] = min(after[i, k], before[i, k] + (paid + local[i]))
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath={"nnan", "nsz"})
+@kernel(nogil=True, error_model="numpy", fastmath={"nnan", "nsz"})
 def _spread(two: Array, left: Array, right: Array, before: Array, local: Array, paid: float, row: Array, after: Array) -> None:
     """Lower `after` to what a step reaches from each pair of levels."""
     size = before.shape[1]
@@ -114,7 +114,7 @@ def _spread(two: Array, left: Array, right: Array, before: Array, local: Array, 
             target[k] = min(target[k], source[k] + (base + two[k] + row[k]))
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy")
 def local_costs(w: Walk, bits: Array, p: int, a: int, i: int, j: int, sums: Array, out: Array) -> None:
     """For the levels i .. j - 1 of the first sum: the least cost that depends on it and on which neighbours are finished."""
     if p == 0 or p == len(w.fixed) - 1:
@@ -131,7 +131,7 @@ def local_costs(w: Walk, bits: Array, p: int, a: int, i: int, j: int, sums: Arra
             out[k] = x if h == 0 else min(out[k], x)
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy", fastmath={"nnan", "nsz"})
+@kernel(nogil=True, error_model="numpy", fastmath={"nnan", "nsz"})
 def _pattern_costs(w: Walk, bits: Array, p: int, a: int, h: int, i: int, j: int, sums: Array) -> None:
     """Into the last row of `sums`: the cheapest choice of finished neighbours.
 
@@ -168,7 +168,7 @@ def _pattern_costs(w: Walk, bits: Array, p: int, a: int, h: int, i: int, j: int,
         out[k] = best + sums[CLASSES, k] + w.weight[a] * factor[k]
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy")
 def _trace(
     w: Walk,
     price: Array,
@@ -208,7 +208,7 @@ def _trace(
             _choose(w, bits, p, region, one, sums, finished[p])
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy")
 def _choose(w: Walk, bits: Array, p: int, a: int, level: int, sums: Array, finished: Ints) -> None:
     """Which neighbours the cheapest choice takes for finished."""
     best, h = np.inf, 0
@@ -224,7 +224,7 @@ def _choose(w: Walk, bits: Array, p: int, a: int, level: int, sums: Array, finis
             finished[:] = trial
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy")
 def _pattern(w: Walk, bits: Array, p: int, a: int, factor: float, first: int, out: Ints) -> float:
     """The cheapest choice in which `first` is the first test passed, and its cost."""
     total, least, forced = w.touch[first], np.inf, -1

@@ -11,15 +11,15 @@ A sum over the finished regions is what its top, its middle and its low regions 
 
 from typing import NamedTuple
 
-import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from app.geometry.compiled import kernel
 from app.geometry.tool import Array
 from app.sequencing.forms import Form, Ints
 
 Single = NDArray[np.float32]
-LOW = 6  # bits of a block
+LOW = 7  # bits of a block
 LANES = 1 << LOW
 
 
@@ -28,10 +28,10 @@ class Rows(NamedTuple):
 
     middle: Single  # (F, 2^m, N) change by the regions of the middle bits
     top: Single  # (F, 2^t, N) start, and change by those of the topmost bits
-    lane: Single  # (F, N, K, 64) change and touch of the lanes; K levels that the high bits reach; infinite: not allowed yet
+    lane: Single  # (F, N, K, LANES) change and touch of the lanes; K levels that the high bits reach; infinite: not allowed yet
     sum_middle: Single  # (Q, 2^m) what means are taken of
     sum_top: Single  # (Q, 2^t)
-    sum_lane: Single  # (Q, 64)
+    sum_lane: Single  # (Q, LANES)
     tests: Ints  # (U, 3, N) bit masks of the regions that pass a test for a
     reached: Ints  # (U, N)
     before: Ints  # (N,)
@@ -47,12 +47,12 @@ class Rows(NamedTuple):
     stated: NDArray[np.bool_]  # (F,) depends on values of the state
     pair: Ints  # (P, 2)
     weight: Single  # (P,)
-    ones: Ints  # (64,) regions of each lane
-    share: Single  # (N, 64) 1 / number finished, by the number of high regions
+    ones: Ints  # (LANES,) regions of each lane
+    share: Single  # (N - LOW + 1, LANES) 1 / number finished, by the number of high regions
     extra: Single  # (N, 2^N) or (0, 0)
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def lay_out(form: Form, middle_bits: int, top_bits: int, row: Ints, flip: NDArray[np.bool_]) -> Rows:
     """Tables of what the topmost, the middle and the low bits add."""
     middle, top = _high_changes(form, middle_bits, top_bits)
@@ -76,7 +76,7 @@ def lay_out(form: Form, middle_bits: int, top_bits: int, row: Ints, flip: NDArra
     )  # fmt: skip
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _high_changes(form: Form, middle_bits: int, top_bits: int) -> tuple[Single, Single]:
     f, n = form.start.shape
     middle, top = np.zeros((f, 1 << middle_bits, n), np.float32), np.zeros((f, 1 << top_bits, n), np.float32)
@@ -90,7 +90,7 @@ def _high_changes(form: Form, middle_bits: int, top_bits: int) -> tuple[Single, 
     return middle, top
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _sums(values: Array, first: int, bits: int) -> Single:
     """out[q, s] = the sum of values[q, first + k] over the bits k of s."""
     out = np.zeros((len(values), 1 << bits), np.float32)
@@ -101,46 +101,60 @@ def _sums(values: Array, first: int, bits: int) -> Single:
     return out
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _masks(tests: NDArray[np.bool_]) -> Ints:
     """[u, k, a] the regions that pass test k of cascade u for region a, as bits."""
     u, k, n, _ = tests.shape
     out = np.zeros((u, k, n), np.int64)
-    for i, j, a in np.ndindex(u, k, n):
-        for b in range(n):
-            out[i, j, a] |= np.int64(tests[i, j, a, b]) << b
+    for i in range(u):
+        for j in range(k):
+            for a in range(n):
+                for b in range(n):
+                    out[i, j, a] |= np.int64(tests[i, j, a, b]) << b
     return out
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _lanes(form: Form, tests: Ints) -> Single:
     """What the low regions add, for every level that the high ones may reach (two bits of k per cascade)."""
     f, n = form.start.shape
     u = len(tests)
-    lane, passed, touch = np.empty((f, n, 4**u, LANES), np.float32), np.empty((u, LANES), np.int64), form.touch.astype(np.float32)
+    lane, touch = np.empty((f, n, 4**u, LANES), np.float32), form.touch.astype(np.float32)
+    passed, own = np.empty(LANES, np.int64), np.empty(LANES, np.float32)
     for a in range(n):
-        for j in range(u):
-            passed[j, 0] = tests.shape[1]
-            for b in range(min(LOW, n)):
-                alone = first_passed(tests, j, a, 1 << b, tests.shape[1])
-                for x in range(1 << b):
-                    passed[j, (1 << b) | x] = min(passed[j, x], alone)
         plain = _sums(form.change[:, a], 0, LOW)
         for i in range(f):
             for k in range(4**u):
-                out = lane[i, a, k]
-                out[:] = plain[i]
-                for j in range(u):
-                    level = k >> (2 * j) & 3
+                for x in range(LANES):
+                    lane[i, a, k, x] = plain[i, x]
+        for j in range(u):
+            _passed_by_lanes(tests, j, a, passed)
+            for i in range(f):
+                if (touch[i, j] != 0).any():
                     for x in range(LANES):
-                        out[x] += touch[i, j, min(level, passed[j, x])]
-        for x in range(LANES):
-            if form.before[a] & (LANES - 1) & ~x:
-                lane[0, a, :, x] = np.inf
+                        own[x] = touch[i, j, passed[x]]
+                    for k in range(4**u):
+                        level = k >> (2 * j) & 3
+                        for x in range(LANES):
+                            lane[i, a, k, x] += touch[i, j, level] if passed[x] > level else own[x]
+        if form.before[a] & (LANES - 1):
+            for x in range(LANES):
+                if form.before[a] & (LANES - 1) & ~x:
+                    lane[0, a, :, x] = np.inf
     return lane
 
 
-@nb.njit(cache=True, nogil=True, inline="always")
+@kernel(nogil=True)
+def _passed_by_lanes(tests: Ints, u: int, a: int, passed: Ints) -> None:
+    """The first test of cascade u that the regions of each lane pass for a."""
+    passed[0] = tests.shape[1]
+    for b in range(LOW):
+        alone = first_passed(tests, u, a, 1 << b, tests.shape[1])
+        for x in range(1 << b):
+            passed[(1 << b) | x] = min(passed[x], alone)
+
+
+@kernel(nogil=True, inline="always")
 def first_passed(tests: Ints, u: int, a: int, regions: int, otherwise: int) -> int:
     """The first test of cascade u before `otherwise` that some of the regions passes for a."""
     level = otherwise
@@ -151,7 +165,7 @@ def first_passed(tests: Ints, u: int, a: int, regions: int, otherwise: int) -> i
     return level
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _two_at_least(form: Form) -> tuple[Single, Ints, Single]:
     """Distances from means, padded to two, which the kernel takes in one go."""
     count, (f, n) = len(form.of), form.start.shape
@@ -161,21 +175,21 @@ def _two_at_least(form: Form) -> tuple[Single, Ints, Single]:
     return own, of, slope
 
 
-@nb.njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _counts(form: Form) -> tuple[Ints, Single]:
     """Regions of each lane, and 1 / number of finished regions by the number of high ones."""
     n = form.start.shape[1]
-    ones, share = np.empty(LANES, np.int64), np.empty((n, LANES), np.float32)
+    ones, share = np.empty(LANES, np.int64), np.empty((n - LOW + 1, LANES), np.float32)
     for x in range(LANES):
         ones[x] = count_bits(x)
     inverse = np.float32(1) / np.maximum(form.count + np.arange(n + LOW + 1), 1).astype(np.float32)
-    for above in range(n):
+    for above in range(len(share)):
         for x in range(LANES):
             share[above, x] = inverse[above + ones[x]]
     return ones, share
 
 
-@nb.njit(inline="always")
+@kernel(inline="always")
 def count_bits(x: int) -> int:
     n = 0
     while x:

@@ -186,7 +186,7 @@ def shortest_sequence(
         method += f" At least {solution.ties:,} orders tie; so many nearly do that they were not all counted."
     order, more = _settle(solution, tie_break)
     sequence = solution.named(order)
-    cost = float(np.asarray(w, np.float64) @ np.add.reduce(problem.steps_of(sequence)))  # `problem.cost_of`, weights checked before
+    cost = float(np.asarray(w, np.float64) @ problem.sums_of(sequence))  # `problem.cost_of`, weights checked before
     return Shortest(sequence, cost, solution.ties, proved=True, method=method + more, bound=cost, counted=counted)
 
 

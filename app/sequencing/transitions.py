@@ -6,10 +6,10 @@ few chosen items, so everything about it follows from the same subset with one i
 
 from typing import NamedTuple
 
-import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from app.geometry.compiled import kernel
 from app.geometry.tool import Array
 from app.sequencing.features import FEATURE_SETS, FeatureSet, base_name
 from app.sequencing.problem import SequencingProblem
@@ -96,7 +96,7 @@ def _factors(problem: SequencingProblem, place: list[int], none: int) -> NDArray
     return factors
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy")
 def transition_cost(
     m: Model,
     a: int,
@@ -151,7 +151,7 @@ def transition_cost(
     return total
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy")
 def box_area(m: Model, lo0: float, lo1: float, hi0: float, hi1: float) -> float:
     """Area of a box as `kernels.box_gaps` takes it."""
     if m.kind == SYNTHETIC:
@@ -173,7 +173,7 @@ def box_area(m: Model, lo0: float, lo1: float, hi0: float, hi1: float) -> float:
     return total
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy")
 def grow_box(m: Model, boxes: Array, to: int, frm: int, b: int) -> None:
     """boxes[to] = boxes[frm] with region b added; rows are (low, low, high, high, box area, own area, members)."""
     lo0, lo1 = min(boxes[frm, 0], m.low[b, 0]), min(boxes[frm, 1], m.low[b, 1])
@@ -189,14 +189,14 @@ def grow_box(m: Model, boxes: Array, to: int, frm: int, b: int) -> None:
     boxes[to, 4], boxes[to, 5], boxes[to, 6] = area, own, members
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy")
 def no_box(boxes: Array, i: int) -> None:
     """Make row i the box of no region."""
     boxes[i, 0], boxes[i, 1], boxes[i, 2], boxes[i, 3] = np.inf, np.inf, -np.inf, -np.inf
     boxes[i, 4], boxes[i, 5], boxes[i, 6] = 0.0, 0.0, 0.0
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy")
 def gap_of(boxes: Array, i: int) -> float:
     """1 - area(S) / area(box of S), 0 for at most one region."""
     if boxes[i, 6] < 2 or not boxes[i, 4] > 0:

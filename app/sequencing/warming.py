@@ -24,6 +24,7 @@ def warm_up() -> None:
         np.full(n, 1 / n), box, box + 1,
     )  # fmt: skip
     problem = problem_for(graph)
+    problem.tensor()  # as the learner has it
     w = np.ones(len(problem.columns))
     best = shortest_sequence(problem, w, Ends(line, line))
     shortest_sequence(problem, w, constraints=Constraints(never_next=((0, 1),)))

@@ -10,10 +10,10 @@ region of the stretch is taken, this is the best order of the stretch (the windo
 
 from typing import NamedTuple
 
-import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from app.geometry.compiled import kernel
 from app.geometry.tool import Array
 from app.sequencing.problem import SequencingProblem, all_sets
 from app.sequencing.transitions import Model, gap_of, grow_box, no_box, transition_cost
@@ -21,7 +21,7 @@ from app.sequencing.transitions import Model, gap_of, grow_box, no_box, transiti
 Order = NDArray[np.int64]
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy")
 def order_cost(m: Model, order: Order, done: NDArray[np.bool_]) -> float:
     """Cost of the order after the regions of `done`; regions in neither are never worked on but count as unfinished."""
     phi, boxes, border = np.zeros(len(m.w) + 1), np.zeros((m.n + 2, 7)), np.zeros((m.n, 3))
@@ -56,7 +56,7 @@ def order_cost(m: Model, order: Order, done: NDArray[np.bool_]) -> float:
     return total
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy")
 def add_finished(m: Model, b: int, border: Array, edge: NDArray[np.int64], corner: NDArray[np.int64]) -> None:
     """Note for every region that b is finished."""
     for a in range(m.n):
@@ -93,7 +93,7 @@ class Choice(NamedTuple):
     after: Array  # (2^k, 7) and around the rest
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy")
 def reinsert(
     m: Model, order: Order, done: NDArray[np.bool_], before: NDArray[np.bool_], start: int, stop: int, taken: Order, out: Order
 ) -> bool:
@@ -130,7 +130,7 @@ def reinsert(
     return True
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy")
 def _choose(m: Model, items: Order, before: NDArray[np.bool_]) -> Choice:
     k, region = len(items), np.zeros(len(items) + 1, np.int64)
     size, slot = 1 << k, np.full(m.n, -1)
@@ -155,7 +155,7 @@ def _choose(m: Model, items: Order, before: NDArray[np.bool_]) -> Choice:
     return c
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy")
 def _join(m: Model, c: Choice, i: int, before: NDArray[np.bool_]) -> None:
     """What the k regions mean to the one in place i."""
     a, k = c.region[i], len(c.region) - 1
@@ -172,14 +172,14 @@ def _join(m: Model, c: Choice, i: int, before: NDArray[np.bool_]) -> None:
         c.border[s, i, 2] = c.border[parent, i, 2] + m.turn[a, b]
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy")
 def _meet(m: Model, c: Choice, a: int, before: NDArray[np.bool_]) -> None:
     """Region a is the next of those that stay."""
     c.region[-1] = a
     _join(m, c, len(c.region) - 1, before)
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy")
 def _past(m: Model, prefix: Order, done: NDArray[np.bool_], c: Choice) -> Past:
     past = Past(done.copy(), np.zeros(3), np.zeros((m.n, 3)), np.zeros(m.n, np.int64), np.zeros(m.n, np.int64))
     no_box(c.boxes, 0)
@@ -191,7 +191,7 @@ def _past(m: Model, prefix: Order, done: NDArray[np.bool_], c: Choice) -> Past:
     return past
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy")
 def _finish(m: Model, past: Past, c: Choice, b: int) -> None:
     """Region b is finished whatever becomes of the k."""
     past.finished[b] = True
@@ -200,7 +200,7 @@ def _finish(m: Model, past: Past, c: Choice, b: int) -> None:
     grow_box(m, c.boxes, 0, 0, b)
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy")
 def _tails(m: Model, finished: NDArray[np.bool_], stretch: Order, stay: Order) -> Array:
     """Boxes of what is unfinished apart from the k, from each region that stays on."""
     r, outside = len(stay), ~finished
@@ -216,7 +216,7 @@ def _tails(m: Model, finished: NDArray[np.bool_], stretch: Order, stay: Order) -
     return tails
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy")
 def _layer_boxes(m: Model, c: Choice, tail: Array) -> None:
     """Boxes around what is finished and around the rest for every subset of the k."""
     full = len(c.lowest) - 1
@@ -228,7 +228,7 @@ def _layer_boxes(m: Model, c: Choice, tail: Array) -> None:
         grow_box(m, c.boxes, s, s & (s - 1), c.region[c.lowest[s]])
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy")
 def _layer(m: Model, c: Choice, past: Past, j: int, more: bool, value: Array, came: NDArray[np.int8]) -> None:
     """All steps where j of the regions that stay are finished; `more` says that another one is to come."""
     k, phi, border = len(c.region) - 1, np.zeros(len(m.w) + 1), np.zeros(3)
@@ -252,7 +252,7 @@ def _layer(m: Model, c: Choice, past: Past, j: int, more: bool, value: Array, ca
                 value[to, then], came[to, then] = x, i
 
 
-@nb.njit(cache=True, nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy")
 def _write(region: Order, stay: Order, came: NDArray[np.int8], start: int, stop: int, out: Order) -> None:
     """The way to the end, backwards."""
     k, j = len(region) - 1, len(stay)

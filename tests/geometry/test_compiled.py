@@ -8,8 +8,9 @@ import pytest
 
 from app.geometry.compiled import _stamp
 
-OUTER = "from {folder}.inner import twice\nfrom app.geometry.compiled import kernel\n\n\n@kernel\ndef plus(x):\n    return twice(x) + 1\n"
-INNER = "from app.geometry.compiled import kernel\n\n\n@kernel\ndef twice(x):\n    return {factor} * x\n"
+IMPORT = "from app.geometry.compiled import kernel\n\n\n"
+OUTER = "from {folder}.inner import twice\n" + IMPORT + "@kernel(nogil=True)\ndef plus(x):\n    return twice(x) + 1\n"
+INNER = IMPORT + "@kernel\ndef twice(x):\n    return {factor} * x\n"
 
 
 def answer(folder: str) -> tuple[int, int]:

@@ -35,7 +35,7 @@ def own_feature(graph: RegionGraph, done: np.ndarray) -> np.ndarray:
 
 
 def made_up(shape: tuple[int, int], seed: int, source: GraphSource, kind: int) -> SequencingProblem:
-    """One of the shipped sets, with other interactions, with a plug-in, or the layout set."""
+    """One of the shipped sets, with other interactions, with a plug-in, the layout set, or with one interaction."""
     graph = grid_graph(*shape, seed, source)
     base = FEATURE_SETS[SETS[source]]
     column, place = Feature("even", "Even", "phi_own"), {"even": (len(base.columns),)}
@@ -47,10 +47,11 @@ def made_up(shape: tuple[int, int], seed: int, source: GraphSource, kind: int) -
         SequencingProblem(graph, base, PAIRS),
         SequencingProblem(graph, extended, (*PAIRS, Interaction("even", "curvature"))),
         SequencingProblem(graph, FEATURE_SETS["layout"], ()),
+        SequencingProblem(graph, base, PAIRS[:1]),
     )[kind]
 
 
-@given(st.sampled_from([(2, 4), (1, 7)]), seeds, sources, st.integers(0, 3))
+@given(st.sampled_from([(2, 4), (1, 7)]), seeds, sources, st.integers(0, 4))
 @settings(max_examples=20, deadline=None)
 def test_block_kernel_equals_the_table(shape: tuple[int, int], seed: int, source: GraphSource, kind: int):
     problem = made_up(shape, seed, source, kind)

@@ -19,6 +19,13 @@ def test_tensor_sums_equal_steps_without_a_table():
     assert np.isfinite(problem.tensor()[0b101, [1, 3]]).all()
 
 
+def test_sums_read_from_the_table_are_those_of_the_steps():
+    problem = problem_for(grid_graph(2, 4, 3))
+    problem.tensor()
+    for order in ((), (5,), (7, 0, 3), tuple(range(8))):
+        assert (problem.sums_of(order) == np.add.reduce(problem.steps_of(order))).all()
+
+
 def test_large_tools_give_the_same_steps():
     problem, order = problem_for(grid_graph(3, 5, 5)), tuple(np.random.default_rng(1).permutation(15).tolist())
     assert problem.feature_sum(order) == pytest.approx(step_by_step(problem, order), abs=1e-12)

@@ -1,12 +1,14 @@
 """The exact search against every order, and the search for large tools against the exact one."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.geometry.tool import GraphSource
-from app.sequencing import answer, block, gaps, nearly, warming
+from app.sequencing import answer, block, gaps, kernels, nearly, warming
 from app.sequencing.classes import equivalent_sequences
 from app.sequencing.comparison import kendall_tau
 from app.sequencing.large import best_found
@@ -91,10 +93,15 @@ def test_kendall_tau():
 
 
 def test_warm_up_compiles_what_a_search_uses():
-    used = (answer.answer, answer.weighed, answer.laid_out, block.fill, nearly.ways_to_end, nearly.lowest_to_end, gaps.box_table)
+    used: tuple[Any, ...] = (
+        answer.answer, answer.weighed, answer.laid_out, block.fill, nearly.ways_to_end, nearly.lowest_to_end, gaps.box_table,
+        kernels.sums_along,
+    )  # fmt: skip
     warming.warm_up()
     before = {k: len(k.signatures) for k in used}
     assert all(before.values())
-    best = shortest_sequence(problem_for(grid_graph(2, 4, 1)), np.ones(13), Ends(np.zeros(8), np.zeros(8)))
-    equivalent_sequences(problem_for(grid_graph(2, 4, 1)), best.sequence)
+    problem = problem_for(grid_graph(2, 4, 1))
+    problem.tensor()
+    best = shortest_sequence(problem, np.ones(13), Ends(np.zeros(8), np.zeros(8)))
+    equivalent_sequences(problem, best.sequence)
     assert {k: len(k.signatures) for k in before} == before
