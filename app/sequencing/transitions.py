@@ -96,7 +96,7 @@ def _factors(problem: SequencingProblem, place: list[int], none: int) -> NDArray
     return factors
 
 
-@kernel(nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy", inline="always")
 def transition_cost(
     m: Model,
     a: int,
@@ -173,7 +173,7 @@ def box_area(m: Model, lo0: float, lo1: float, hi0: float, hi1: float) -> float:
     return total
 
 
-@kernel(nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy", inline="always")
 def grow_box(m: Model, boxes: Array, to: int, frm: int, b: int) -> None:
     """boxes[to] = boxes[frm] with region b added; rows are (low, low, high, high, box area, own area, members)."""
     lo0, lo1 = min(boxes[frm, 0], m.low[b, 0]), min(boxes[frm, 1], m.low[b, 1])
@@ -196,7 +196,7 @@ def no_box(boxes: Array, i: int) -> None:
     boxes[i, 4], boxes[i, 5], boxes[i, 6] = 0.0, 0.0, 0.0
 
 
-@kernel(nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy", inline="always")
 def gap_of(boxes: Array, i: int) -> float:
     """1 - area(S) / area(box of S), 0 for at most one region."""
     if boxes[i, 6] < 2 or not boxes[i, 4] > 0:
