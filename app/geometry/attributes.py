@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from app.geometry.compiled import kernel
 from app.geometry.fitting import AREA, CYLINDER, KINDS, NORMAL_WEIGHT, SPHERE, fit, sums_about
+from app.geometry.main_faces import is_flat
 from app.geometry.quadrics import CONE, fit_cone, fit_quadric
 from app.geometry.tool import Array, Mesh
 
@@ -73,13 +74,15 @@ def region_shape(mesh: Mesh, faces: NDArray[np.int64]) -> tuple[float, str]:
     """Signed dominant curvature (1/m) and kind of one region.
 
     Paper: curvature comes from the fitted primitive, 1/r (of a cone: at its mean square distance to the axis); where none fits,
-    from how the normals turn over the region.
+    from how the normals turn over the region. A flat face stays one with its holes and fillets.
     """
     chosen = mesh.faces[faces]
     low, high = (box[0] for box in region_boxes(mesh.vertices, chosen, np.zeros(len(chosen), np.int32), 1))
     scale = float(np.linalg.norm(high - low))
     sums = sums_about(mesh.vertices, chosen, (low + high) / 2, scale)
     kind, curvature = _primitive(sums)
+    if kind != "plane" and is_flat(mesh.vertices[chosen]):
+        return 0.0, "plane"
     if kind in ("plane", "cylinder", "cone", "sphere"):
         return curvature / scale, kind
     bend = turning_curvature(mesh.vertices[chosen])

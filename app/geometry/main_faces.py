@@ -1,5 +1,6 @@
 """Which way a region looks where it meets another: its flat main face, the cylinder, cone or sphere it is, else its triangles."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ from app.geometry.round_shapes import ROUND, Round, fit_round
 from app.geometry.tool import Array, Mesh, Tool
 
 NEAR_FLAT = np.radians(10)  # triangles within this of the median normal belong to the flat face
+LEVEL = np.radians(0.4)  # the same for what is called a plane whatever else belongs to it
 EXACTLY = np.radians(1)  # the same for what looks round as a whole: a large flat face with its fillet is nearly a large cylinder
 MOSTLY = 0.6  # share of the area from which a region with something bent at its edge counts as a flat face
 FEW, SURELY = 500, 0.4  # triangles looked at first, and the share of them below which the region isn't mostly flat
@@ -51,12 +53,40 @@ def find_main_faces(tool: Tool) -> MainFaces:
     return MainFaces(unit, flat, tuple(shapes))
 
 
+def facing(mesh: Mesh, labels: NDArray[np.int32], kinds: Sequence[str], mean: Array) -> Array:
+    """Which way each region looks (n, 3): the normal of its flat main face, else its mean normal (n, 3).
+
+    A fillet that belongs to one of two faces turns the mean normal by up to half the angle between them, the main face not at all.
+    """
+    cross = _crosses(mesh)
+    twice = np.sqrt(np.einsum("ij,ij->i", cross, cross))
+    result, order = mean.copy(), np.argsort(labels, kind="stable")
+    ends = np.searchsorted(labels[order], np.arange(len(kinds) + 1))
+    for a, kind in enumerate(kinds):
+        mine = order[ends[a] : ends[a + 1]]
+        main = flat_face(kind, cross[mine] / np.maximum(twice[mine], 1e-300)[:, None], twice[mine])
+        result[a] = mean[a] if main is None else main
+    return result
+
+
+def is_flat(corners: Array) -> bool:
+    """Whether most of a region, given by the corners of its triangles (F, 3, 3), is exactly level with itself."""
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    twice = np.sqrt(np.einsum("ij,ij->i", cross, cross))
+    return _mostly(cross / np.maximum(twice, 1e-300)[:, None], twice, LEVEL) is not None
+
+
 def flat_face(kind: str, normals: Array, weight: Array) -> Array | None:
     """Unit normal of the flat face that most of a region of a kind is; None where it bends all over.
 
     It is the geometric median of the triangles' normals: what is bent at the edge of a flat face doesn't move it.
     """
-    limit = np.cos(EXACTLY if kind in ROUND else NEAR_FLAT)
+    return _mostly(normals, weight, EXACTLY if kind in ROUND else NEAR_FLAT)
+
+
+def _mostly(normals: Array, weight: Array, within: float) -> Array | None:
+    """Median of the normals where most of them are within an angle of it."""
+    limit = np.cos(within)
     step = -(-len(normals) // FEW)
     few = _median(normals[::step], weight[::step])  # enough to see that a region bends
     if few is None or weight[::step][normals[::step] @ few > limit].sum() < SURELY * weight[::step].sum():

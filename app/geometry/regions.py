@@ -12,6 +12,7 @@ from app.geometry.cleaning import face_pairs
 from app.geometry.descriptions import describe
 from app.geometry.distances import surface_distances
 from app.geometry.fitting import AREA, NORMAL_WEIGHT, add_up, face_sums
+from app.geometry.main_faces import facing
 from app.geometry.merging import absorb_small, build_tree
 from app.geometry.splitting import quantiles
 from app.geometry.tool import Array, Mesh, Region, RegionGraph, Tool, region_letters
@@ -83,7 +84,7 @@ def _graph(mesh: Mesh, labels: NDArray[np.int32], attributes: Attributes) -> Reg
     shared = borders.shared(n)
     perimeter = borders.perimeter(n)[:, None]
     neighbour = shared > 0
-    tilt = np.arccos(np.clip(attributes.normal[:, 2], -1, 1))
+    tilt = np.arccos(np.clip(facing(mesh, labels, attributes.kind, attributes.normal)[:, 2], -1, 1))
     total, plan = attributes.area.sum(), _plan_area(attributes)
     height, top = attributes.high[:, 2], attributes.high[:, 2].max()
     depth = top - attributes.low[:, 2].min()

@@ -196,3 +196,19 @@ def test_turning_a_tool_leaves_sizes_angles_and_ways_alone(mould: Mould) -> None
         assert (one.border, one.angle or 0) == pytest.approx((other.border, other.angle or 0), abs=1e-6)
     ways = [surface_distances(t.mesh, t.labels, np.array([r.centroid for r in t.regions])) for t in (before, after)]
     assert ways[0] == pytest.approx(ways[1], rel=0.03)  # where two points are nearest to a centroid, rounding chooses the middle
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_tilt_changes_by_the_angle_of_the_faces_whichever_has_the_fillet(sign: int) -> None:
+    """A fillet of a tenth of the side turns the mean normal by degrees; the change of tilt stays that of the flat faces."""
+    for owner in (0, 1):
+        tool = l_profile(owner, np.radians(50), radius=0.05, sign=sign)
+        assert tool.graph.angle == pytest.approx(np.radians(50) * np.array([[0, 1], [-1, 0]]), abs=1e-6)
+        assert [r.kind for r in tool.regions] == ["plane"] * 2
+        assert [r.curvature for r in tool.regions] == [0, 0]
+
+
+def test_a_flat_plate_with_a_wall_at_its_edge_is_a_plane() -> None:
+    """A level plate and the wall of a slot, a fifth as large: one region, still a plane."""
+    tool = profile([(0, 0), (0.5, 0), (0.5, 0.1)], [0, 0])
+    assert (tool.regions[0].kind, tool.regions[0].curvature) == ("plane", 0)
