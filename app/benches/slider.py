@@ -36,6 +36,11 @@ def measure_slider(composite: Composite) -> Iterator[Figure]:
             note = "slowest of 6 positions, 3 to 40 regions; processor time"
             yield Figure("slider", f"slider_whole_answer_{size}, {composite.name}", max(spent), "s", BAR, note=note)
             yield Figure("slider", f"mean of these, {composite.name}, {size}", sum(spent) / len(spent), "s")
+            segmentations.edit_tool(ctx, tool_id, {"kind": "lock", "regions": [0, 3], "on": True})
+            spent = [_seconds(lambda n=n: _answer(ctx, tool_id, n, continues=n != TARGETS[0])) for n in TARGETS]
+            note = "one drag beside two locked regions, slowest of 6 positions"
+            yield Figure("slider", f"slider_locked_{size}, {composite.name}", max(spent), "s", BAR, note=note)
+            segmentations.edit_tool(ctx, tool_id, {"kind": "lock", "regions": [0, 1], "on": False})
             piece = _seconds(lambda: _reassign(ctx, tool_id))
             yield Figure(
                 "slider", f"first reassign after it, {composite.name}, {size}", piece, "s", note="finding the piece, moving it, storing"
@@ -53,8 +58,8 @@ def _tool(ctx: Context, composite: Composite, path: Path) -> str:
     return tool["id"]
 
 
-def _answer(ctx: Context, tool_id: str, regions: int) -> None:
-    segmentations.recut_tool(ctx, tool_id, {"target": regions})
+def _answer(ctx: Context, tool_id: str, regions: int, *, continues: bool = False) -> None:
+    segmentations.recut_tool(ctx, tool_id, {"target": regions}, continues=continues)
     segmentations.list_regions(ctx, tool_id)
     tool = tools.tool_value(ctx, tool_id)
     find_lines(tool, 1e-3)

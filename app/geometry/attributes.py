@@ -36,25 +36,38 @@ class Attributes:
 def find_attributes(mesh: Mesh, labels: NDArray[np.int32]) -> Attributes:
     """Measure every region."""
     n = int(labels.max()) + 1
-    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
-    cross = np.cross(b - a, c - a) / 2
-    face_area = np.sqrt(np.einsum("ij,ij->i", cross, cross))
-    inside = labels >= 0
-
-    def total(values: Array) -> Array:
-        return np.bincount(labels[inside], weights=values[inside], minlength=n).astype(float, copy=False)
-
-    area = total(face_area)
-    centres = (a + b + c) / 3
-    centroid = np.stack([total(face_area * centres[:, k]) for k in range(3)], axis=1) / area[:, None]
-    normal = np.stack([total(cross[:, k]) for k in range(3)], axis=1)
+    total = _totals(mesh.vertices, mesh.faces, labels, n)
+    area, projected, centroid, normal = total[:, 0], total[:, 1], total[:, 2:5] / total[:, :1], total[:, 5:]
     size = np.linalg.norm(normal, axis=1)
     # a region that closes on itself (a ring wall) has no mean normal; call it upright
     normal = np.where((size > 1e-6 * area)[:, None], normal / np.maximum(size, 1e-300)[:, None], [0.0, 0.0, 1.0])
     low, high = region_boxes(mesh.vertices, mesh.faces, labels, n)
     bends = [region_shape(mesh, np.flatnonzero(labels == a)) for a in range(n)]
     curvature, kind = np.array([b for b, _ in bends]), tuple(k for _, k in bends)
-    return Attributes(area, total(np.abs(cross[:, 2])), centroid, normal, curvature, kind, low, high)
+    return Attributes(area, projected, centroid, normal, curvature, kind, low, high)
+
+
+@kernel
+def _totals(vertices, faces, labels, n):  # pragma: no cover - compiled
+    """Per region (n, 8): area, area seen from above, area times centre, area times unit normal."""
+    total = np.zeros((n, 8))
+    for f in range(len(faces)):
+        if labels[f] < 0:
+            continue
+        a, b, c = vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]]
+        x, y, z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+        u, v, w = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+        i, j, k = (y * w - z * v) / 2, (z * u - x * w) / 2, (x * v - y * u) / 2
+        area = np.sqrt(i * i + j * j + k * k)
+        row = total[labels[f]]
+        row[0] += area
+        row[1] += abs(k)
+        for d in range(3):
+            row[2 + d] += area * ((a[d] + b[d] + c[d]) / 3)
+        row[5] += i
+        row[6] += j
+        row[7] += k
+    return total
 
 
 @kernel
@@ -68,6 +81,27 @@ def region_boxes(vertices, faces, labels, n):  # pragma: no cover - compiled
                     low[labels[f], c] = min(low[labels[f], c], vertices[v, c])
                     high[labels[f], c] = max(high[labels[f], c], vertices[v, c])
     return low, high
+
+
+def nearest_middles(mesh: Mesh, labels: NDArray[np.int32], points: Array) -> Array:
+    """Of each region the middle of the face that is nearest to its point (n, 3)."""
+    return _nearest_middles(mesh.vertices, mesh.faces, labels, points)
+
+
+@kernel
+def _nearest_middles(vertices, faces, labels, wanted):  # pragma: no cover - compiled
+    points, nearest = np.zeros_like(wanted), np.full(len(wanted), np.inf)
+    for f in range(len(faces)):
+        region = labels[f]
+        if region < 0:
+            continue
+        middle = (vertices[faces[f, 0]] + vertices[faces[f, 1]] + vertices[faces[f, 2]]) / 3
+        x, y, z = middle - wanted[region]
+        distance = x * x + y * y + z * z
+        if distance < nearest[region]:
+            nearest[region] = distance
+            points[region] = middle
+    return points
 
 
 def region_shape(mesh: Mesh, faces: NDArray[np.int64]) -> tuple[float, str]:

@@ -42,20 +42,60 @@ class Borders:
 
 def find_borders(mesh: Mesh, labels: NDArray[np.int32]) -> Borders:
     """Edges where the region changes, the working surface ends, or the mesh isn't a surface (1 or more than 2 faces)."""
-    _, side_edge, count = edge_table(mesh.faces)
-    sides, beyond_face = _border_sides(side_edge, count, labels.astype(np.int64))
-    face, side = np.divmod(sides, 3)
-    ends = np.stack([mesh.faces[face, side], mesh.faces[face, (side + 1) % 3]], axis=1).astype(np.int64)
+    faces, owner = np.ascontiguousarray(mesh.faces, np.int64), labels.astype(np.int64)
+    mixed, ends_here = _meeting(faces, owner, len(mesh.vertices))
+    meeting = mixed | ends_here
+    near = _beside(faces, meeting)
+    edges, side_edge, count = edge_table(faces[near])
+    sides, beyond_face = _border_sides(side_edge, count, meeting[edges].all(axis=1), owner[near])
+    face, side = near[sides // 3], sides % 3
+    ends = np.stack([faces[face, side], faces[face, (side + 1) % 3]], axis=1)
     length = np.linalg.norm(mesh.vertices[ends[:, 0]] - mesh.vertices[ends[:, 1]], axis=1)
-    beyond = np.where(beyond_face == FREE, FREE, labels[beyond_face]).astype(np.int64)
-    return Borders(labels[face].astype(np.int64), beyond, ends, length, face, beyond_face)
+    free = beyond_face == FREE
+    beyond_face = np.where(free, FREE, near[beyond_face])
+    return Borders(owner[face], np.where(free, FREE, owner[beyond_face]), ends, length, face, beyond_face)
 
 
 @kernel
-def _border_sides(side_edge, count, labels):  # pragma: no cover - compiled
+def _meeting(faces, labels, n):  # pragma: no cover - compiled
+    """Vertices (n,) at which labels differ, and those at which the surface ends: both ends of every border edge are among them.
+
+    Around a vertex inside a surface every neighbour comes once before and once behind it. Where the surface ends some neighbour
+    doesn't, and the sum over the faces of what stands for the one before less what stands for the one behind isn't 0.
+    """
+    name, turn = np.empty(n, np.int64), np.zeros(n, np.int64)
+    for v in range(n):  # numbers that don't add up by chance
+        x = (v + 1) * 0x1E3779B97F4A7C15
+        x = (x ^ (x >> 30)) * 0x3F58476D1CE4E5B9
+        name[v] = x ^ (x >> 27)
+    first, mixed = np.full(n, -2), np.zeros(n, np.bool_)
+    for f in range(len(faces)):
+        for k in range(3):
+            v = faces[f, k]
+            if first[v] == -2:
+                first[v] = labels[f]
+            elif first[v] != labels[f]:
+                mixed[v] = True
+            turn[v] += name[faces[f, (k + 1) % 3]] - name[faces[f, (k + 2) % 3]]
+    return mixed, turn != 0
+
+
+@kernel
+def _beside(faces, marked):  # pragma: no cover - compiled
+    """Faces with two or more of the marked vertices."""
+    found, count = np.empty(len(faces), np.int64), 0
+    for f in range(len(faces)):
+        if int(marked[faces[f, 0]]) + int(marked[faces[f, 1]]) + int(marked[faces[f, 2]]) > 1:
+            found[count] = f
+            count += 1
+    return found[:count]
+
+
+@kernel
+def _border_sides(side_edge, count, listed, labels):  # pragma: no cover - compiled
     """Sides (3 face + k) that are a border, in their order, and the face beyond each: FREE where there isn't exactly one other.
 
-    An edge with more than two faces is no border where all of them belong to one region.
+    Only edges that are `listed` count, and one with more than two faces is no border where all of them belong to one region.
     """
     first, last = np.full(len(count), FREE), np.full(len(count), FREE)
     alike = np.ones(len(count), np.bool_)
@@ -69,7 +109,7 @@ def _border_sides(side_edge, count, labels):  # pragma: no cover - compiled
     for f in range(len(side_edge)):
         for k in range(3):
             edge = side_edge[f, k]
-            if labels[f] >= 0 and not (alike[edge] and count[edge] > 1):
+            if listed[edge] and labels[f] >= 0 and not (alike[edge] and count[edge] > 1):
                 sides[found] = 3 * f + k
                 beyond[found] = first[edge] + last[edge] - f if count[edge] == 2 else FREE
                 found += 1
@@ -79,8 +119,9 @@ def _border_sides(side_edge, count, labels):  # pragma: no cover - compiled
 def corner_neighbours(mesh: Mesh, labels: NDArray[np.int32], shared: Array) -> NDArray[np.bool_]:
     """Pairs of regions (n, n) that have a vertex but no border in common."""
     n = len(shared)
-    inside = labels >= 0
-    vertex, region = mesh.faces[inside].ravel(), np.repeat(labels[inside], 3)
+    mixed, _ = _meeting(np.ascontiguousarray(mesh.faces, np.int64), labels.astype(np.int64), len(mesh.vertices))
+    inside = (labels >= 0)[:, None] & mixed[mesh.faces]
+    vertex, region = mesh.faces[inside], np.broadcast_to(labels[:, None], mesh.faces.shape)[inside]
     incidence = coo_matrix((np.ones(len(vertex)), (region, vertex)), shape=(n, len(mesh.vertices))).tocsr()
     touching = (incidence @ incidence.T).toarray() > 0
     np.fill_diagonal(touching, False)
@@ -133,10 +174,10 @@ def _add_opposite(way, beyond, length, least, result):  # pragma: no cover - com
 
 def tangent_frame(normal: Array) -> Array:
     """Two unit vectors (2, 3) across `normal`; the first is horizontal, along x for a level region."""
-    right = np.array([1.0, 0.0, 0.0]) if abs(normal[2]) > 0.999 else np.cross([0.0, 0.0, 1.0], normal)
-    right = right - (right @ normal) * normal
-    right /= np.linalg.norm(right)
-    return np.stack([right, np.cross(normal, right)])
+    x, y, z = (float(v) for v in normal)
+    right = np.array([1.0 - x * x, -x * y, -x * z] if abs(z) > 0.999 else [-y, x, 0.0])
+    u, v, w = (float(c) for c in right / np.sqrt(right @ right))
+    return np.array([[u, v, w], [y * w - z * v, z * u - x * w, x * v - y * u]])
 
 
 def _outer_loop(ends: Integers, length: Array) -> NDArray[np.bool_]:
@@ -145,31 +186,42 @@ def _outer_loop(ends: Integers, length: Array) -> NDArray[np.bool_]:
     return loop == np.argmax(np.bincount(loop, weights=length))
 
 
-def _outside(points: Array) -> Array:
+@kernel
+def _outside(points):  # pragma: no cover - compiled
     """Points that may lie on the convex hull: not inside the polygon of those that are farthest out in some directions."""
-    at = np.linspace(0, 2 * np.pi, 16, endpoint=False)
-    x, y = np.ascontiguousarray(points[:, 0]), np.ascontiguousarray(points[:, 1])
-    farthest = [int(np.argmax(c * x + s * y)) for c, s in zip(np.cos(at), np.sin(at), strict=True)]
-    inside = np.ones(len(points), bool)
-    for i, k in zip(farthest, farthest[1:] + farthest[:1], strict=True):
-        way = points[k] - points[i]
-        if way.any():
-            inside &= way[0] * (y - y[i]) - way[1] * (x - x[i]) > 1e-9 * (way @ way)
-    return points[~inside]
+    ways = 16
+    corner, reach = np.zeros(ways, np.int64), np.full(ways, -np.inf)
+    c, s = np.cos(2 * np.pi * np.arange(ways) / ways), np.sin(2 * np.pi * np.arange(ways) / ways)
+    for i in range(len(points)):
+        for k in range(ways):
+            far = c[k] * points[i, 0] + s[k] * points[i, 1]
+            if far > reach[k]:
+                corner[k], reach[k] = i, far
+    outside = np.zeros(len(points), np.bool_)
+    for k in range(ways):
+        a, b = points[corner[k]], points[corner[(k + 1) % ways]]
+        x, y = b[0] - a[0], b[1] - a[1]
+        if x == 0 and y == 0:
+            continue
+        for i in range(len(points)):
+            if x * (points[i, 1] - a[1]) - y * (points[i, 0] - a[0]) <= 1e-9 * (x * x + y * y):
+                outside[i] = True
+    return points[outside]
 
 
-def smallest_rectangle(points: Array) -> Array:
-    """Axes (2, 2) of the rectangle with the smallest area around the points; one side lies on the hull."""
-    points = _outside(points) if len(points) > MANY else points
+def smallest_rectangle(points: Array) -> tuple[Array, Array]:
+    """Axes (2, 2) of the rectangle with the smallest area around the points, one side lies on the hull, and its sides (2,)."""
+    points = _outside(np.ascontiguousarray(points)) if len(points) > MANY else points
     try:
         hull = points[ConvexHull(points).vertices]
     except QhullError:  # all points on one line
         along = points[np.argmax(np.linalg.norm(points - points[0], axis=1))] - points[0]
         size = np.linalg.norm(along)
         u = along / size if size > 0 else np.array([1.0, 0.0])
-        return np.stack([u, [-u[1], u[0]]])
+        axes = np.stack([u, [-u[1], u[0]]])
+        return axes, np.ptp(axes @ points.T, axis=1)
     edge = np.roll(hull, -1, axis=0) - hull
     u = edge / np.linalg.norm(edge, axis=1)[:, None]
-    along, across = hull @ u.T, hull @ np.stack([-u[:, 1], u[:, 0]])
-    best = u[np.argmin(np.ptp(along, axis=0) * np.ptp(across, axis=0))]
-    return np.stack([best, [-best[1], best[0]]])
+    along, across = np.ptp(u @ hull.T, axis=1), np.ptp(np.stack([-u[:, 1], u[:, 0]], axis=1) @ hull.T, axis=1)
+    best = int(np.argmin(along * across))
+    return np.stack([u[best], [-u[best, 1], u[best, 0]]]), np.array([along[best], across[best]])

@@ -140,6 +140,8 @@ def _edges_of(faces, n):  # pragma: no cover - compiled
     edge = -1
     for low in range(n):
         first, last = start[low], start[low + 1]
+        if last == first:
+            continue
         order = np.argsort(other[first:last], kind="mergesort")
         for at in range(last - first):
             here = first + order[at]
@@ -166,6 +168,24 @@ def _pairs_at(side_edge, count):  # pragma: no cover - compiled
             if count[edge] == 2:
                 pairs[edge, 1 if pairs[edge, 0] >= 0 else 0] = f
     return pairs[count == 2]
+
+
+def shared_length(vertices: Array, faces: NDArray[np.integer], pairs: Integers) -> Array:
+    """Length of the edge that each pair of faces (P, 2) shares (P,)."""
+    return _lengths_of(np.ascontiguousarray(vertices, np.float64), np.ascontiguousarray(faces, np.int64), pairs)
+
+
+@kernel
+def _lengths_of(vertices, faces, pairs):  # pragma: no cover - compiled
+    length = np.empty(len(pairs))
+    for p in range(len(pairs)):
+        f, g = faces[pairs[p, 0]], faces[pairs[p, 1]]
+        odd = 0  # the corner of the first face that the second doesn't have; the edge lies across from it
+        while odd < 2 and (f[odd] == g[0] or f[odd] == g[1] or f[odd] == g[2]):
+            odd += 1
+        side = vertices[f[(odd + 1) % 3]] - vertices[f[(odd + 2) % 3]]
+        length[p] = np.sqrt(side[0] ** 2 + side[1] ** 2 + side[2] ** 2)
+    return length
 
 
 def components(faces: Integers) -> Integers:
@@ -196,6 +216,16 @@ def joined(links, n):  # pragma: no cover - compiled
         else:
             piece[i] = piece[above[i]]
     return piece
+
+
+@kernel
+def diagonal(points):  # pragma: no cover - compiled
+    """Diagonal of the box around points (P, 3)."""
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for point in points:
+        for c in range(3):
+            low[c], high[c] = min(low[c], point[c]), max(high[c], point[c])
+    return np.sqrt(np.sum((high - low) ** 2))
 
 
 def areas(vertices: Array, faces: NDArray[np.integer]) -> Array:

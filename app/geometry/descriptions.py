@@ -29,11 +29,12 @@ def describe(attributes: Attributes) -> tuple[str, ...]:
     """One description per region, unique within the tool."""
     low, high = attributes.low.min(axis=0), attributes.high.max(axis=0)
     nouns = [_noun(attributes, i, low, high) for i in range(len(attributes.area))]
-    texts = []
-    for i, noun in enumerate(nouns):
-        alike = [k for k, other in enumerate(nouns) if other == noun]
-        place = _place(attributes.centroid[i], attributes.centroid[alike], low, high)
-        texts.append(f"{noun}, {place}" if len(alike) > 1 or noun in ("Floor", "Crown", "Hollow", "Top") else noun)
+    texts = list(nouns)
+    for noun in set(nouns):
+        alike = [i for i, other in enumerate(nouns) if other == noun]
+        if len(alike) > 1 or noun in ("Floor", "Crown", "Hollow", "Top"):
+            for i, place in zip(alike, _places(attributes.centroid[alike], low, high), strict=True):
+                texts[i] = f"{noun}, {place}"
     return _numbered(texts, attributes)
 
 
@@ -75,27 +76,26 @@ def _wall(normal: Array, relative: Array) -> str:
     return f"{stands} outer wall" if stands == looks else f"{stands} wall"
 
 
-def _place(centroid: Array, alike: Array, low: Array, high: Array) -> str:
-    """Where in plan view, only along directions in which like regions differ."""
-    size = np.maximum(high - low, 1e-9)
-    here, others = (centroid - low) / size, (alike - low) / size
-    words = [_word(here[axis], others[:, axis], names) for axis, names in ((1, ALONG), (0, ACROSS))]
-    return " ".join(w for w in words if w) or "middle"
+def _places(centroids: Array, low: Array, high: Array) -> list[str]:
+    """Where like regions lie in plan view, only along directions in which they differ."""
+    at = (centroids - low) / np.maximum(high - low, 1e-9)
+    words = zip(_words(at[:, 1], ALONG), _words(at[:, 0], ACROSS), strict=True)
+    return [" ".join(w for w in both if w) or "middle" for both in words]
 
 
-def _word(here: float, others: Array, names: tuple[tuple[str, ...], ...]) -> str:
-    """Coarsest name of a position in [0, 1] that tells all levels of like regions apart; rows beyond five are counted."""
-    ordered = np.sort(others)
+def _words(at: Array, names: tuple[tuple[str, ...], ...]) -> list[str]:
+    """Coarsest names of positions in [0, 1] that tell all their levels apart; rows beyond five are counted."""
+    ordered = np.sort(at)
     starts = np.flatnonzero(np.diff(ordered, prepend=-np.inf) > LEVEL)
     levels = np.array([part.mean() for part in np.split(ordered, starts[1:])])
-    if len(levels) == 1 and len(others) > 1:
-        return ""
-    mine = int(np.argmin(np.abs(levels - here)))
+    if len(levels) == 1 and len(at) > 1:
+        return [""] * len(at)
+    mine = np.argmin(np.abs(levels - at[:, None]), axis=1)
     for choice in names:
-        at = np.clip(levels * len(choice), 0, len(choice) - 1).astype(int)
-        if len(set(at.tolist())) == len(levels):
-            return choice[at[mine]]
-    return f"row {len(levels) - mine}" if names is ALONG else f"column {mine + 1}"
+        chosen = np.clip(levels * len(choice), 0, len(choice) - 1).astype(int)
+        if len(set(chosen.tolist())) == len(levels):
+            return [choice[chosen[k]] for k in mine]
+    return [f"row {len(levels) - k}" if names is ALONG else f"column {k + 1}" for k in mine]
 
 
 def _numbered(texts: list[str], attributes: Attributes) -> tuple[str, ...]:

@@ -10,12 +10,14 @@ import heapq
 import numpy as np
 from numpy.typing import NDArray
 
+from app.geometry.cleaning import diagonal
 from app.geometry.compiled import kernel
 from app.geometry.slicing import closest_points
 from app.geometry.tool import Array, Mesh
 
 FINEST = 1 / 48  # of the surface's diagonal: longer edges are halved before, as long triangles know distances at their ends only
 MOST_FACES = 60_000  # beyond this nothing more is halved
+TIED = 1e-9  # of the diagonal: points that are as near to a target; the first one counts, however the part is turned
 MOST_VISITS = 40  # of a vertex; a bound for meshes that are no surfaces
 
 
@@ -34,8 +36,10 @@ def surface_distances(mesh: Mesh, labels: NDArray[np.int32], targets: Array) -> 
     corners = vertices[faces]
     foot = closest_points(corners, targets[region])
     away = np.linalg.norm(foot - targets[region], axis=1)
-    order = np.lexsort((away, region))
-    first = order[np.searchsorted(region[order], np.arange(n))]
+    nearest = np.full(n, np.inf)
+    np.minimum.at(nearest, region, away)
+    near = np.flatnonzero(away <= nearest[region] + TIED * diagonal(vertices))
+    first = near[np.unique(region[near], return_index=True)[1]]
     middle = foot[first]
     start, around = _around(faces, len(vertices))
     result = np.empty((n, n))
@@ -49,7 +53,7 @@ def surface_distances(mesh: Mesh, labels: NDArray[np.int32], targets: Array) -> 
 
 def halved(vertices: Array, faces: NDArray[np.int64], region: NDArray[np.int32]) -> tuple[Array, NDArray[np.int64], NDArray[np.int32]]:
     """The same surface with no edge longer than FINEST of its diagonal, neighbours still meeting edge to edge."""
-    longest = FINEST * float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    longest = FINEST * float(diagonal(vertices))
     while len(faces) < MOST_FACES:
         sides = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1), axis=-1).reshape(-1, 2)
         edges, edge = np.unique(sides[:, 0] * len(vertices) + sides[:, 1], return_inverse=True)

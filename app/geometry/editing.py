@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.errors import InvalidInput
-from app.geometry.cleaning import areas, face_pairs
+from app.geometry.cleaning import areas, face_pairs, shared_length
 from app.geometry.regions import measure_labelled
 from app.geometry.slicing import Integers, Sliced, split_edges
 from app.geometry.splitting import connected
@@ -127,7 +127,7 @@ def best_neighbour(tool: Tool, piece: NDArray[np.bool_]) -> int | None:
     other = (beyond >= 0) & (beyond != tool.labels[inner])
     if not other.any():
         return None
-    length = shared_length(tool.mesh, inner[other], outer[other])
+    length = shared_length(tool.mesh.vertices, tool.mesh.faces, np.stack([inner[other], outer[other]], axis=1))
     return int(np.argmax(np.bincount(beyond[other], weights=length)))
 
 
@@ -171,7 +171,7 @@ def finish_division(tool: Tool, sliced: Sliced, labels: Integers, region: int, s
 def gather_scraps(mesh: Mesh, inside: Integers, pairs: Integers, piece: Integers) -> Integers:
     """Pieces numbered from the largest on; scraps belong to the piece they share most border with."""
     area = areas(mesh.vertices, mesh.faces[inside].astype(np.int64))
-    length = shared_length(mesh, inside[pairs[:, 0]], inside[pairs[:, 1]])
+    length = shared_length(mesh.vertices, mesh.faces, inside[pairs])
     while True:
         names, piece = np.unique(piece, return_inverse=True)
         size = np.bincount(piece, weights=area)
@@ -229,12 +229,3 @@ def _names(tool: Tool, present: Integers) -> tuple[str, ...]:
 def name_of(tool: Tool, region: int) -> str:
     """How people call it."""
     return tool.regions[region].name
-
-
-def shared_length(mesh: Mesh, one: Integers, other: Integers) -> Array:
-    """Length of the edge that each pair of faces shares (K,)."""
-    first, second = mesh.faces[one], mesh.faces[other]
-    common = (first[:, :, None] == second[:, None, :]).any(axis=2)
-    corner = np.argsort(~common, axis=1, kind="stable")[:, :2]
-    ends = mesh.vertices[np.take_along_axis(first, corner, axis=1)]
-    return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)

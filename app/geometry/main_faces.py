@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from app.geometry.compiled import kernel
 from app.geometry.round_shapes import ROUND, Round, fit_round
 from app.geometry.tool import Array, Mesh, Tool
 
@@ -100,13 +101,21 @@ def _median(normals: Array, weight: Array) -> Array | None:
     median = weight @ normals
     if np.linalg.norm(median) <= 1e-6 * weight.sum():
         return None
-    median /= np.linalg.norm(median)
+    return _settled(np.ascontiguousarray(normals), np.ascontiguousarray(weight), median / np.linalg.norm(median))
+
+
+@kernel
+def _settled(normals, weight, median):  # pragma: no cover - compiled
+    """Weiszfeld's iteration on the unit sphere."""
     for _ in range(ROUNDS):
-        away = normals - median
-        pull = weight / np.maximum(np.sqrt(np.einsum("ij,ij->i", away, away)), 1e-9)
-        step = pull @ normals
-        step /= np.linalg.norm(step)
-        moved = np.linalg.norm(step - median)
+        step = np.zeros(3)
+        for i in range(len(normals)):
+            x, y, z = normals[i, 0] - median[0], normals[i, 1] - median[1], normals[i, 2] - median[2]
+            pull = weight[i] / max(np.sqrt(x * x + y * y + z * z), 1e-9)
+            for c in range(3):
+                step[c] += pull * normals[i, c]
+        step /= np.sqrt(np.sum(step * step))
+        moved = np.sqrt(np.sum((step - median) ** 2))
         median = step
         if moved < SETTLED:
             break

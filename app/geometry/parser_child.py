@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from app.errors import AppError
-from app.geometry.cleaning import edge_table
+from app.geometry.cleaning import areas, components
 from app.geometry.parsing import parse
 
 MEMORY_BYTES = 6 * 2**30
@@ -58,7 +58,8 @@ def run_child(request: dict[str, Any]) -> None:
 
 def main() -> None:
     """Serve requests until stdin ends."""
-    edge_table(np.array([[0, 1, 2]]))  # compiled, or loaded, once for all children
+    areas(np.eye(3), np.array([[0, 1, 2]]))  # compiled, or loaded, once for all children
+    components(np.array([[0, 1, 2]]))
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C belongs to the server, which then closes stdin
     for line in iter(sys.stdin.buffer.readline, b""):
         child = os.fork()

@@ -7,17 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.geometry.carry_over import map_regions
-from app.geometry.cleaning import areas, face_pairs
-from app.geometry.editing import shared_length
+from app.geometry.cleaning import areas, face_pairs, shared_length
 from app.geometry.importing import ImportedPart
 from app.geometry.merge_tree import MergeTree
 from app.geometry.pieces import tree_for
 from app.geometry.regions import measure, measure_labelled
-from app.geometry.segmentation import MOST_TARGET, Cut, Patches, Report, SegmentationParameters, ignore, segment
+from app.geometry.segmentation import Cut, Patches, Report, SegmentationParameters, find_patches, ignore, patches_beside, segment
 from app.geometry.splitting import connected
 from app.geometry.tool import Tool, region_letters
 
-ROUNDS = 3  # of cutting more finely around locked regions
 LETTERS = 702  # A to ZZ: names nobody gave
 SCRAP = 0.01  # share of the working surface below which what is left of a new region beside a locked one goes to a neighbour
 
@@ -39,8 +37,9 @@ def recut(
     locked: Sequence[int] = (),
     report: Report = ignore,
     patches: Patches | None = None,
+    here: MergeTree | None = None,
 ) -> Recut:
-    """Cut a part; with its kept tree and patches that takes no time.
+    """Cut a part; with its kept trees and patches that takes no time.
 
     Args:
         part: The part.
@@ -49,10 +48,13 @@ def recut(
         before: The tool as it was cut so far; regions that stay the same keep the names people gave them.
         locked: Regions of `before` that stay.
         report: Told the progress.
-        patches: What `find_patches` found with these parameters, where it was kept; only of use without locked regions.
+        patches: What `find_patches` found with these parameters, with locked regions `beside_locked`, where it was kept.
+        here: The merge tree on the triangles of `before`, where it was kept; only of use with locked regions.
     """
     if before is not None and locked:
-        return recut_around(before, locked, part, parameters, tree_for(before, part, tree))
+        here = replace(tree, leaf=(here or tree_for(before, part, tree)).leaf)
+        patches = patches or beside_locked(before, locked, find_patches(part, parameters, tree), tree, here)
+        return recut_around(before, locked, part, parameters, here, patches)
     cut = segment(part, parameters, report, tree, patches)
     tool = measure(cut.part.mesh, cut.labels)
     return Recut(tool if before is None else _with_given_names(before, tool), (), cut.tree)
@@ -68,7 +70,24 @@ def _with_given_names(before: Tool, tool: Tool) -> Tool:
     return replace(tool, regions=tuple(replace(r, name=given.get(i, r.name)) for i, r in enumerate(tool.regions)))
 
 
-def recut_around(tool: Tool, locked: Sequence[int], part: ImportedPart, parameters: SegmentationParameters, tree: MergeTree) -> Recut:
+def beside_locked(tool: Tool, locked: Sequence[int], patches: Patches, tree: MergeTree, here: MergeTree) -> Patches:
+    """What is left of a part's patches on a tool's triangles beside its locked regions.
+
+    Args:
+        tool: The tool as it is.
+        locked: Regions that stay.
+        patches: Of the part.
+        tree: The part's merge tree.
+        here: The same tree on the tool's triangles.
+    """
+    patch = np.full(tree.leaves, -1, np.int64)
+    patch[tree.leaf] = patches.labels  # a patch holds whole leaves
+    return patches_beside(replace(patches, labels=patch[here.leaf]), tool.mesh, np.isin(tool.labels, list(locked)))
+
+
+def recut_around(
+    tool: Tool, locked: Sequence[int], part: ImportedPart, parameters: SegmentationParameters, tree: MergeTree, patches: Patches
+) -> Recut:
     """Cut everything but the locked regions anew; they keep their names, and get the first numbers.
 
     Args:
@@ -77,15 +96,14 @@ def recut_around(tool: Tool, locked: Sequence[int], part: ImportedPart, paramete
         part: The part it was made from, for its CAD faces.
         parameters: How finely to cut the rest.
         tree: The merge tree on the tool's triangles.
+        patches: What there is beside the locked regions, on the tool's triangles.
     """
     here = replace(part, mesh=tool.mesh, cad_face=np.full(len(tool.mesh.faces), -1, np.int32))
-    made, labels = _cut_beside(here, tool, locked, parameters, tree)
-    for _ in range(ROUNDS):  # part of the regions asked for lies where the locked ones are; then more are needed
-        wanted, found = (parameters.target or 0) - len(locked), int(labels.max()) + 1 - len(locked)
-        if parameters.target is None or found >= wanted or parameters.target == MOST_TARGET:
-            break
-        parameters = replace(parameters, target=min(MOST_TARGET, -(-parameters.target * wanted // max(found, 1))))
-        made, labels = _cut_beside(here, tool, locked, parameters, tree)
+    if (patches.labels >= 0).any():
+        made, labels = _cut_beside(here, tool, locked, parameters, tree, patches)
+    else:  # all of it is locked
+        made, labels = Cut(here, tool.labels, tree, np.arange(len(tool.labels))), np.searchsorted(sorted(locked), tool.labels)
+        labels = np.where(tool.labels >= 0, labels, -1).astype(np.int32)
     kept = [tool.regions[a].name for a in sorted(locked)]
     count = int(labels.max()) + 1
     free = [name for name in region_letters(count + len(kept)) if name not in kept]
@@ -94,10 +112,12 @@ def recut_around(tool: Tool, locked: Sequence[int], part: ImportedPart, paramete
 
 
 def _cut_beside(
-    part: ImportedPart, tool: Tool, locked: Sequence[int], parameters: SegmentationParameters, tree: MergeTree
+    part: ImportedPart, tool: Tool, locked: Sequence[int], parameters: SegmentationParameters, tree: MergeTree, patches: Patches
 ) -> tuple[Cut, NDArray[np.int32]]:
-    """The cut with the locked regions of the tool as labels 0, 1, ... and the new ones behind them."""
-    cut = segment(part, parameters, tree=tree)
+    """The cut with the locked regions of the tool as labels 0, 1, ... and new ones, of the patches beside them, behind."""
+    wanted, most = parameters.target, max(1, parameters.most - len(locked))
+    fewer = replace(parameters, target=None if wanted is None else max(1, wanted - len(locked)), most=most)
+    cut = segment(part, fewer, tree=tree, patches=patches)
     before = tool.labels[cut.source]
     held = np.isin(before, list(locked))
     labels = np.where(cut.labels >= 0, cut.labels + len(locked), -1).astype(np.int64)
@@ -115,7 +135,7 @@ def _without_scraps(part: ImportedPart, labels: np.ndarray, locked: int) -> np.n
     owner = np.full(int(piece.max()) + 1, -1, np.int64)
     owner[piece] = labels
     least = SCRAP * area[labels >= 0].sum()
-    length = shared_length(part.mesh, pairs[:, 0], pairs[:, 1])
+    length = shared_length(part.mesh.vertices, part.mesh.faces, pairs)
     while True:
         size = np.bincount(piece, weights=area, minlength=len(owner))
         small = [p for p in np.argsort(size).tolist() if 0 < size[p] < least and owner[p] >= locked]

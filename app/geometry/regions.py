@@ -6,15 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.errors import InvalidInput
-from app.geometry.attributes import Attributes, find_attributes, region_boxes
+from app.geometry.attributes import Attributes, find_attributes, nearest_middles, region_boxes
 from app.geometry.borders import corner_neighbours, find_borders, opposite_lengths
 from app.geometry.cleaning import face_pairs
 from app.geometry.descriptions import describe
 from app.geometry.distances import surface_distances
-from app.geometry.fitting import AREA, NORMAL_WEIGHT, add_up, face_sums
+from app.geometry.fitting import NORMAL_WEIGHT, add_up, face_sums
 from app.geometry.main_faces import facing
 from app.geometry.merging import absorb_small, build_tree
-from app.geometry.splitting import quantiles
+from app.geometry.splitting import Surface, split_large
 from app.geometry.tool import Array, Mesh, Region, RegionGraph, Tool, region_letters
 
 ROW_OVERLAP = 0.5  # share of the smaller region's depth that two regions of one row have in common
@@ -138,6 +138,8 @@ def warm_up() -> None:
     tree = build_tree(sums, np.arange(2), pairs, lambda _: None)
     tree.children_of(tree.cut(1, tolerance=0.1), 0)
     absorb_small(sums, pairs, 0.1, 1, NORMAL_WEIGHT)
-    quantiles(vertices[faces][:, :, 0], add_up(sums, np.arange(2))[:, AREA], np.array([0.5]))
-    measure(Mesh(vertices, faces.astype(np.int32)), np.zeros(2, np.int32))
+    add_up(sums, np.arange(2))
+    split_large(Surface(vertices, faces, np.full(2, -1, np.int32), np.zeros(2, np.int64), np.arange(2)), 2, 2)
+    tool = measure(Mesh(vertices, faces.astype(np.int32)), np.zeros(2, np.int32))
+    nearest_middles(tool.mesh, tool.labels, vertices[:1])
     surface_distances(Mesh(vertices, faces.astype(np.int32)), np.zeros(2, np.int32), vertices[:1])

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.geometry.borders import tangent_frame
+from app.geometry.cleaning import diagonal
 from app.geometry.tool import Array, Mesh
 
 ROUND = ("cylinder", "cone", "sphere")
@@ -45,7 +46,7 @@ def fit_round(kind: str, mesh: Mesh, faces: NDArray[np.int32]) -> Round | None:
     points, corners = mesh.vertices[used_vertices(mesh, faces)], mesh.vertices[faces]
     middle = points.mean(axis=0)
     x = points - middle
-    size = float(np.linalg.norm(np.ptp(x, axis=0)))
+    size = diagonal(x)
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     twice = np.linalg.norm(cross, axis=1)
     if kind == "sphere":
@@ -93,10 +94,11 @@ def unroll(shape: Round, corners: Array) -> tuple[Array, Array]:
     # the tip of a cone lies at any angle: at that of the next corner
     angle = np.where(distance < 1e-6 * distance.max(), np.roll(angle, -1, axis=1), angle)
     turn = (angle - angle[:, :1] + np.pi) % (2 * np.pi) - np.pi
-    start, width = (angle[:, 0] + turn.min(axis=1)) % (2 * np.pi), np.ptp(turn, axis=1)
-    cut, gap = _widest_gap(start, start + width)
+    first, last = (choose(choose(turn[:, 0], turn[:, 1]), turn[:, 2]) for choose in (np.minimum, np.maximum))
+    start = (angle[:, 0] + first) % (2 * np.pi)
+    cut, gap = _widest_gap(start, start + last - first)
     place = (start - cut + gap / 2) % (2 * np.pi) - gap / 2
-    unrolled = place[:, None] + turn - turn.min(axis=1, keepdims=True)
+    unrolled = (place - first)[:, None] + turn
     if gap <= OPEN:
         unrolled = np.clip(unrolled, 0, 2 * np.pi)
     middle = (unrolled.min() + unrolled.max()) / 2 + cut

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.errors import InvalidInput, UnreadableMesh
-from app.geometry.cleaning import areas, face_pairs
+from app.geometry.cleaning import face_pairs
+from app.geometry.compiled import kernel
 from app.geometry.denoise import denoised
 from app.geometry.fitting import AREA, NORMAL_WEIGHT, PLANE, PRODUCT, add_up, face_sums
 from app.geometry.importing import ImportedPart
@@ -115,6 +116,14 @@ def find_patches(part: ImportedPart, parameters: SegmentationParameters, tree: M
     return Patches(labels, add_up(sums, labels), _label_pairs(labels, pairs))
 
 
+def patches_beside(patches: Patches, mesh: Mesh, held: NDArray[np.bool_]) -> Patches:
+    """What is left of the patches of a mesh beside the faces `held` (F,)."""
+    pairs = face_pairs(mesh.faces)
+    left = np.where(held, -1, patches.labels)
+    labels = _numbered(np.where(left >= 0, connected(left, pairs), -1))
+    return Patches(labels, add_up(unit_sums(mesh), labels), _label_pairs(labels, pairs))
+
+
 def _to_regions(patches: Patches, parameters: SegmentationParameters) -> Integers:
     """Region of each face (F,): patches merged as far as is wanted."""
     sums, pairs, into = patches.sums, patches.pairs, np.arange(len(patches.sums))
@@ -154,10 +163,27 @@ def unit_sums(mesh: Mesh) -> Array:
 
     A far origin would eat the digits of the fourth powers; the box's own diagonal would change when the part is turned.
     """
-    corners, area = mesh.vertices[mesh.faces], areas(mesh.vertices, mesh.faces)
-    middle = np.average(corners.mean(axis=1), axis=0, weights=area)
-    spread = np.average(((corners - middle) ** 2).sum(axis=2).mean(axis=1), weights=area)
+    middle, spread = _weighted(mesh.vertices, mesh.faces)
     return face_sums((mesh.vertices - middle) / np.sqrt(12 * spread), mesh.faces)
+
+
+@kernel
+def _weighted(vertices, faces):  # pragma: no cover - compiled
+    """Middle of a surface (3,), and the mean square distance of its triangles' corners from it, both by area."""
+    total, middle, square = 0.0, np.zeros(3), 0.0
+    for turn in range(2):
+        for f in range(len(faces)):
+            a, b, c = vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]]
+            u, v = b - a, c - a
+            area = np.sqrt((u[1] * v[2] - u[2] * v[1]) ** 2 + (u[2] * v[0] - u[0] * v[2]) ** 2 + (u[0] * v[1] - u[1] * v[0]) ** 2) / 2
+            if turn == 0:
+                total += area
+                middle += area * (a + b + c) / 3
+            else:
+                square += area * (np.sum((a - middle) ** 2) + np.sum((b - middle) ** 2) + np.sum((c - middle) ** 2)) / 3
+        if turn == 0:
+            middle /= total
+    return middle, square / total
 
 
 def _first_clusters(cad_face: NDArray[np.int32], pairs: Integers) -> Integers:

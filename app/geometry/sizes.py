@@ -44,8 +44,7 @@ def _size(mesh: Mesh, faces: NDArray[np.int32], kind: str, normal: Array) -> Siz
         flat = mesh.vertices[used_vertices(mesh, faces)] @ frame.T
     else:
         flat, frame = unroll(shape, mesh.vertices[faces])
-    axes = smallest_rectangle(flat)
-    sides = np.ptp(flat @ axes.T, axis=0)
+    axes, sides = smallest_rectangle(flat)
     long = int(sides[1] > sides[0])
     x, y, _ = axes[long] @ frame
     level = sides[long] > SQUARE * sides[1 - long] and np.hypot(x, y) > UPRIGHT

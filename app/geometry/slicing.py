@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from app.geometry.compiled import kernel
 from app.geometry.tool import Array, Mesh
 
 Integers = NDArray[np.int64]
@@ -35,35 +36,80 @@ def split_edges(mesh: Mesh, ends: Integers, along: Array) -> Sliced:
     wanted = low * total + high
     order = np.argsort(wanted)
     faces = mesh.faces.astype(np.int64)
-    following = np.roll(faces, -1, axis=1)
-    keys = np.minimum(faces, following) * total + np.maximum(faces, following)  # (F, 3) edges ab, bc, ca
-    at = np.minimum(np.searchsorted(wanted, keys, sorter=order), max(len(wanted) - 1, 0))
-    middle = np.where(wanted[order][at] == keys, total + order[at], -1) if len(wanted) else np.full_like(faces, -1)
-    result, source = _subdivide(faces, middle, vertices)
+    middle = at_new_vertices(faces, low[order], high[order], total)
+    new = middle >= 0
+    middle[new] = total + order[middle[new] - total]
+    result, source = subdivide(faces, middle, vertices)
     return Sliced(Mesh(vertices, result.astype(np.int32)), source, total + np.arange(len(ends)))
 
 
-def _subdivide(faces: Integers, middle: Integers, vertices: Array) -> tuple[Integers, Integers]:
-    """Faces after new vertices `middle` (F, 3; -1 none) on their edges, and the old face of each. Whole faces stay in front."""
-    count = (middle >= 0).sum(axis=1)
-    whole, one, two, three = (np.flatnonzero(count == n) for n in range(4))
-    a, b, c, m, _ = _turned(faces, middle, one, np.argmax(middle[one] >= 0, axis=1))
-    pieces = [faces[whole], np.stack([a, m, c], axis=1), np.stack([m, b, c], axis=1)]
-    a, b, c, m, n = _turned(faces, middle, two, (np.argmin(middle[two] >= 0, axis=1) + 2) % 3)
-    across = np.linalg.norm(vertices[m] - vertices[c], axis=1) < np.linalg.norm(vertices[b] - vertices[n], axis=1)
-    pieces += [np.stack([a, m, n], axis=1), np.stack([m, b, np.where(across, c, n)], axis=1)]
-    pieces.append(np.stack([np.where(across, m, b), c, n], axis=1))
-    (a, b, c), (m, n, o) = faces[three].T, middle[three].T
-    pieces += [np.stack(corners, axis=1) for corners in ((a, m, o), (m, b, n), (n, c, o), (m, n, o))]
-    return np.concatenate(pieces), np.concatenate([whole, one, one, two, two, two, three, three, three, three])
+def at_new_vertices(faces: Integers, low: Integers, high: Integers, total: int) -> Integers:
+    """New vertex on each side of each face (F, 3), -1 without; new vertex k lies on the edge from low[k] to high[k]."""
+    mark = np.zeros(total, bool)
+    mark[low] = mark[high] = True
+    return _at_sides(faces, low * total + high, mark)
 
 
-def _turned(faces: Integers, middle: Integers, chosen: Integers, first: Integers) -> tuple[Integers, ...]:
-    """Corners a, b, c of the chosen faces from corner `first` on, and the new vertices on ab and ca."""
-    turn = (first[:, None] + np.arange(3)) % 3
-    corners = np.take_along_axis(faces[chosen], turn, axis=1)
-    new = np.take_along_axis(middle[chosen], turn, axis=1)
-    return corners[:, 0], corners[:, 1], corners[:, 2], new[:, 0], new[:, 2]
+@kernel
+def _at_sides(faces, crossed, mark):  # pragma: no cover - compiled
+    middle, total = np.full(faces.shape, -1, np.int64), len(mark)
+    for f in range(len(faces)):
+        for k in range(3):
+            a, b = faces[f, k], faces[f, (k + 1) % 3]
+            if mark[a] and mark[b]:
+                key = min(a, b) * total + max(a, b)
+                at = np.searchsorted(crossed, key)
+                if at < len(crossed) and crossed[at] == key:
+                    middle[f, k] = total + at
+    return middle
+
+
+@kernel
+def subdivide(faces, middle, vertices):  # pragma: no cover - compiled
+    """Triangles (F', 3) after new vertices `middle` (F, 3; -1 none) on their edges, and the old face of each (F',).
+
+    Whole ones come first, then all first pieces of those with one new vertex, their second pieces, and so on.
+    """
+    count = np.zeros(4, np.int64)
+    for f in range(len(faces)):
+        count[(middle[f, 0] >= 0) + (middle[f, 1] >= 0) + (middle[f, 2] >= 0)] += 1
+    at = np.array([0, count[0], count[0] + 2 * count[1], count[0] + 2 * count[1] + 3 * count[2]])
+    total = at[3] + 4 * count[3]
+    result, source = np.empty((total, 3), np.int64), np.empty(total, np.int64)
+    for f in range(len(faces)):
+        new = (middle[f, 0] >= 0) + (middle[f, 1] >= 0) + (middle[f, 2] >= 0)
+        here = at[new]
+        at[new] += 1
+        if new == 0:
+            result[here], source[here] = faces[f], f
+            continue
+        first = 0  # corner from which on it is looked at: the new vertices lie on ab, on ab and ca, or on all sides
+        while new < 3 and ((middle[f, first] < 0) if new == 1 else (middle[f, (first + 1) % 3] >= 0)):
+            first += 1
+        a, b, c = faces[f, first], faces[f, (first + 1) % 3], faces[f, (first + 2) % 3]
+        m, n = middle[f, first], middle[f, (first + 2) % 3]
+        if new == 1:
+            _put(result, here, a, m, c)
+            _put(result, here + count[1], m, b, c)
+        elif new == 2:
+            across = np.linalg.norm(vertices[m] - vertices[c]) < np.linalg.norm(vertices[b] - vertices[n])
+            _put(result, here, a, m, n)
+            _put(result, here + count[2], m, b, c if across else n)
+            _put(result, here + 2 * count[2], m if across else b, c, n)
+        else:
+            middle_bc = middle[f, 1]
+            _put(result, here, a, m, n)
+            _put(result, here + count[3], m, b, middle_bc)
+            _put(result, here + 2 * count[3], middle_bc, c, n)
+            _put(result, here + 3 * count[3], m, middle_bc, n)
+        for piece in range(new + 1):
+            source[here + piece * count[new]] = f
+    return result, source
+
+
+@kernel
+def _put(rows, at, a, b, c):  # pragma: no cover - compiled
+    rows[at, 0], rows[at, 1], rows[at, 2] = a, b, c
 
 
 def insert_point(mesh: Mesh, face: int, point: Array) -> Sliced:

@@ -10,10 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
 
-from app.geometry.cleaning import areas, face_pairs, joined
+from app.geometry.borders import smallest_rectangle
+from app.geometry.cleaning import areas, diagonal, face_pairs, joined, shared_length
 from app.geometry.compiled import kernel
+from app.geometry.slicing import at_new_vertices, subdivide
 from app.geometry.tool import Array
 
 Integers = NDArray[np.int64]
@@ -104,59 +105,33 @@ def cut_by_plane(surface: Surface, region: int, normal: Array, offset: float, ah
     With `ahead` (V,) only edges between two such vertices are split: a half plane cuts, not a plane.
     """
     height = surface.vertices @ normal - offset
-    height[np.abs(height) < ON_PLANE * np.linalg.norm(np.ptp(surface.vertices, axis=0))] = 0
+    height[np.abs(height) < ON_PLANE * diagonal(surface.vertices)] = 0
     total = len(surface.vertices)
-    inside = surface.faces[surface.labels == region]
-    following = np.roll(inside, -1, axis=1)
-    across = height[inside] * height[following] < 0
-    if ahead is not None:
-        across &= ahead[inside] & ahead[following]
-    ends = np.sort(np.stack([inside[across], following[across]], axis=1), axis=1)
-    crossed = np.unique(ends[:, 0] * total + ends[:, 1])
+    crossed = np.unique(_crossed(surface.faces, surface.labels, region, height, np.ones(0, bool) if ahead is None else ahead))
     if len(crossed) == 0:
         return surface
     low, high = crossed // total, crossed % total
     along = height[low] / (height[low] - height[high])
     points = surface.vertices[low] + along[:, None] * (surface.vertices[high] - surface.vertices[low])
-    middle = _at_new_vertices(surface.faces, low, high, total)
+    middle = at_new_vertices(surface.faces, low, high, total)
     vertices = np.concatenate([surface.vertices, points])
-    faces, source = _subdivide(surface.faces, middle, vertices)
+    faces, source = subdivide(surface.faces, middle, vertices)
     return Surface(vertices, faces, surface.cad_face[source], surface.labels[source], surface.source[source])
 
 
-def _at_new_vertices(faces: Integers, low: Integers, high: Integers, total: int) -> Integers:
-    """New vertex on each side of each face (F, 3), -1 without; new vertex k lies on the edge from low[k] to high[k]."""
-    crossed, mark = low * total + high, np.zeros(total, bool)
-    mark[low] = mark[high] = True
-    middle = np.full(faces.shape, -1, np.int64)
-    a, b, c = mark[faces].T
-    near = np.flatnonzero((a & b) | (b & c) | (c & a))
-    corners, following = faces[near], np.roll(faces[near], -1, axis=1)
-    keys = np.minimum(corners, following) * total + np.maximum(corners, following)
-    at = np.minimum(np.searchsorted(crossed, keys), len(crossed) - 1)
-    middle[near] = np.where(crossed[at] == keys, total + at, -1)
-    return middle
-
-
-def _subdivide(faces: Integers, middle: Integers, vertices: Array) -> tuple[Integers, Integers]:
-    """Triangles (F', 3) after new vertices `middle` (F, 3; -1 none) on their edges, and the old face of each (F',)."""
-    a, b, c = (middle >= 0).T.astype(np.int8)
-    whole, one, two = (np.flatnonzero(a + b + c == n) for n in range(3))
-    a, b, c, m, _ = _turned(faces, middle, one, np.argmax(middle[one] >= 0, axis=1))
-    pieces = [faces[whole], np.stack([a, m, c], axis=1), np.stack([m, b, c], axis=1)]
-    a, b, c, m, n = _turned(faces, middle, two, (np.argmin(middle[two] >= 0, axis=1) + 2) % 3)
-    across = np.linalg.norm(vertices[m] - vertices[c], axis=1) < np.linalg.norm(vertices[b] - vertices[n], axis=1)
-    pieces += [np.stack([a, m, n], axis=1), np.stack([m, b, np.where(across, c, n)], axis=1)]
-    pieces.append(np.stack([np.where(across, m, b), c, n], axis=1))
-    return np.concatenate(pieces), np.concatenate([whole, one, one, two, two, two])
-
-
-def _turned(faces: Integers, middle: Integers, chosen: Integers, first: Integers) -> tuple[Integers, ...]:
-    """Corners a, b, c of the chosen faces from corner `first` on, and the new vertices on ab and ca."""
-    turn = (first[:, None] + np.arange(3)) % 3
-    corners = np.take_along_axis(faces[chosen], turn, axis=1)
-    new = np.take_along_axis(middle[chosen], turn, axis=1)
-    return corners[:, 0], corners[:, 1], corners[:, 2], new[:, 0], new[:, 2]
+@kernel
+def _crossed(faces, labels, region, height, ahead):  # pragma: no cover - compiled
+    """Edges (lower vertex * vertices + higher one) of a region whose ends have different signs, once per side."""
+    found, count = np.empty(2 * len(faces), np.int64), 0
+    for f in range(len(faces)):
+        if labels[f] != region:
+            continue
+        for k in range(3):
+            a, b = faces[f, k], faces[f, (k + 1) % 3]
+            if height[a] * height[b] < 0 and (len(ahead) == 0 or (ahead[a] and ahead[b])):
+                found[count] = min(a, b) * len(height) + max(a, b)
+                count += 1
+    return found[:count]
 
 
 def _parts(shares: Array, least: int, most: int, large: float) -> Integers:
@@ -252,17 +227,9 @@ def rectangle(surface: Surface, region: int) -> tuple[Array, Array]:
     _, axes = np.linalg.eigh((corners - middle).T * weight @ (corners - middle))
     plane = axes[:, :0:-1].T  # the two widest directions
     flat = (corners - middle) @ plane.T
-    try:
-        hull = flat[ConvexHull(flat).vertices]
-    except QhullError:  # all in one line
-        return plane, np.ptp(flat, axis=0)
-    sides = np.roll(hull, -1, axis=0) - hull
-    sides /= np.linalg.norm(sides, axis=1)[:, None]
-    frames = np.stack([sides, np.stack([-sides[:, 1], sides[:, 0]], axis=1)], axis=1)  # (H, 2, 2)
-    sizes = np.ptp(np.einsum("hij,vj->hvi", frames, hull), axis=1)
-    best = int(np.argmin(sizes.prod(axis=1)))
-    order = np.argsort(-sizes[best])
-    return frames[best][order] @ plane, sizes[best][order]
+    axes, sides = smallest_rectangle(flat)
+    order = np.argsort(-sides)
+    return axes[order] @ plane, sides[order]
 
 
 def _layout(parts: int, aspect: float, spare: bool) -> tuple[int, int]:
@@ -283,27 +250,17 @@ def _gather(surface: Surface, region: int, cells: Integers, parts: int, free: in
     pairs = face_pairs(faces)
     piece = connected(cells, pairs)
     area = areas(surface.vertices, faces)
-    length = _shared_length(surface.vertices, faces, pairs)
+    length = shared_length(surface.vertices, faces, pairs)
     while True:
-        names, piece = np.unique(piece, return_inverse=True)
         size = np.bincount(piece, weights=area)
         least = int(np.argmin(size))
-        if len(names) == 1 or (len(names) <= parts and size[least] >= SCRAP * area.sum() / parts):
+        if len(size) == 1 or (len(size) <= parts and size[least] >= SCRAP * area.sum() / parts):
             break
         both = piece[pairs]
         touching = (both == least).sum(axis=1) == 1
-        border = np.bincount(both[touching].sum(axis=1) - least, weights=length[touching], minlength=len(names))
+        border = np.bincount(both[touching].sum(axis=1) - least, weights=length[touching], minlength=len(size))
         piece = np.where(piece == least, int(np.argmax(border)), piece)
+        piece -= piece > least
     labels = surface.labels.copy()
     labels[inside] = np.where(piece == 0, region, free - 1 + piece)
     return replace(surface, labels=labels)
-
-
-def _shared_length(vertices: Array, faces: Integers, pairs: Integers) -> Array:
-    """Length of the edge that each pair of faces shares (P,)."""
-    first, second = faces[pairs[:, 0]], faces[pairs[:, 1]]
-    # the corner of the first face that the second doesn't have; the edge lies across from it
-    odd = np.stack([(first[:, k] != second[:, 0]) & (first[:, k] != second[:, 1]) & (first[:, k] != second[:, 2]) for k in range(3)])
-    at, rows = np.argmax(odd, axis=0), np.arange(len(first))
-    side = vertices[first[rows, (at + 1) % 3]] - vertices[first[rows, (at + 2) % 3]]
-    return np.sqrt(np.einsum("ij,ij->i", side, side))

@@ -1,6 +1,7 @@
 """The core values of the pipeline: a mesh, the regions it is cut into, and what the features need to know of them."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -72,6 +73,7 @@ class Tool:
         return len(self.regions)
 
 
+@lru_cache
 def region_letters(n: int) -> tuple[str, ...]:
     """A..Z, then AA, AB, ..."""
     names: list[str] = []

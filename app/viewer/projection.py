@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from app.geometry.attributes import nearest_middles
 from app.geometry.tool import Array, Tool
 
 AZIMUTH, ELEVATION = -0.46, 0.84  # rad; the camera stands to the left in front of the tool and looks down on it
@@ -62,12 +63,7 @@ def project(points: Array, camera: Camera, width: float, height: float) -> Array
 
 def label_points(tool: Tool) -> Array:
     """A point on the surface of every region (N, 3), in the middle of the face nearest to its centroid."""
-    a, b, c = (tool.mesh.vertices[tool.mesh.faces[:, k]] for k in range(3))
-    middles = (a + b + c) / 3
-    offset = middles - np.array([r.centroid for r in tool.regions])[tool.labels]  # those beside the regions are not asked for
-    distance = np.einsum("ij,ij->i", offset, offset)
-    nearest = (np.flatnonzero(tool.labels == region) for region in range(tool.n))
-    return middles[[faces[np.argmin(distance[faces])] for faces in nearest]]
+    return nearest_middles(tool.mesh, tool.labels, np.array([r.centroid for r in tool.regions]))
 
 
 def _axes(forward: Array, up: Array) -> tuple[Array, Array]:

@@ -30,6 +30,7 @@ class Before:
     tool: Tool
     locked: tuple[int, ...]
     hidden: tuple[int, ...]
+    tool_sha: str
     tree: Callable[[], MergeTree]  # of the tool's triangles; takes a moment the first time
 
 

@@ -11,7 +11,7 @@ from sqlmodel import Session, col, func, select
 from app.errors import Conflict, InvalidInput, StaleVersion
 from app.geometry.importing import ImportedPart
 from app.geometry.merge_tree import MergeTree
-from app.geometry.recutting import recut
+from app.geometry.recutting import beside_locked, recut
 from app.geometry.segmentation import Patches, SegmentationParameters
 from app.geometry.tool import Tool
 from app.jobs.rows import unfinished_job
@@ -86,7 +86,7 @@ def recut_tool(ctx: Context, tool_id: str, parameters: Json, segmentation_id: st
     """
     known = SegmentationParameters(**parameters)
 
-    def value(session: Session) -> tuple[str, Before, ImportedPart, MergeTree, Patches | None]:
+    def value(session: Session) -> tuple[str, Before, Before, ImportedPart, MergeTree, Patches]:
         before_id, before = _before(ctx, session, tool_id, "cut", segmentation_id)
         row = present(session, ToolRow, tool_id)
         part, tree = ctx.values.part(row.part_sha), ctx.values.part_tree(row.tree_sha)
@@ -96,13 +96,18 @@ def recut_tool(ctx: Context, tool_id: str, parameters: Json, segmentation_id: st
             raise Conflict(f"{row.name} was read in before its merges were kept. Cut it once in the background, then this works at once.")
         if known.denoise:
             tree = ctx.values.denoised_tree(row.part_sha)
-        patches = None if before.locked else ctx.values.patches(row.part_sha, part, tree, known)
-        return before_id, before, part, tree, patches
+        base = _replaced_base(ctx, session, row) if continues else None
+        patches = ctx.values.patches(row.part_sha, part, tree, known)
+        return before_id, before, base or before, part, tree, patches
 
-    before_id, before, part, tree, patches = ctx.store.read(value)
-    made = recut(part, known, tree, before.tool, before.locked, patches=patches)
+    before_id, before, base, part, tree, patches = ctx.store.read(value)
+    here = base.tree() if base.locked else None
+    if here is not None:
+        key = ("beside", base.tool_sha, base.locked, known.tolerance, known.denoise)
+        patches = ctx.values.beside.get(key, lambda: beside_locked(base.tool, base.locked, patches, tree, here))
+    made = recut(part, known, tree, base.tool, base.locked, patches=patches, here=here)
     tool, held = made.tool, made.held
-    kept = tuple(before.locked[held.index(a)] if a in held else -1 for a in range(tool.n))
+    kept = (*sorted(before.locked), *[-1] * (tool.n - len(held)))  # the locked ones come first, in their order
     hidden = tuple(a for a, old in enumerate(kept) if old in before.hidden)
     after = After(tool, kept, tuple(held), hidden, f"Cut into {tool.n} regions")
     content = tool_to_bytes(tool)
@@ -250,9 +255,22 @@ def _before(ctx: Context, session: Session, tool_id: str, kind: str, segmentatio
     row, cut = _editable(session, tool_id, kind)
     if segmentation_id is not None:
         _check_unchanged(row, cut, segmentation_id)
+    return cut.id, _as_before(ctx, session, row, cut)
+
+
+def _replaced_base(ctx: Context, session: Session, row: ToolRow) -> Before | None:
+    """What the slider started from, when all it did since takes the place of what it did before: cuts don't pile up on each other."""
+    cut = ready_segmentation(session, row)
+    if cut.parent_id is None or not _only_passed(session, cut):
+        return None
+    start = found(session, Segmentation, cut.parent_id, "segmentation")
+    return _as_before(ctx, session, row, start)
+
+
+def _as_before(ctx: Context, session: Session, row: ToolRow, cut: Segmentation) -> Before:
     tool = ctx.values.tool(session, cut)
     tree = partial(ctx.values.tree, tool, cut.tool_sha, row.part_sha, row.tree_sha)
-    return cut.id, Before(tool, tuple(cut.locked), tuple(cut.hidden), tree)
+    return Before(tool, tuple(cut.locked), tuple(cut.hidden), cut.tool_sha, tree)
 
 
 def _editable(session: Session, tool_id: str, kind: str) -> tuple[ToolRow, Segmentation]:

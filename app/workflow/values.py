@@ -64,6 +64,7 @@ class Values:
         self._problems = Kept(KEPT_PROBLEMS)
         self.reports = Kept(KEPT_REPORTS)
         self.measures = Kept(KEPT_MAPS)  # of regions
+        self.beside = Kept(KEPT_TREES)  # patches beside locked regions
         self.comparisons = Kept(KEPT_COMPARISONS)  # of experts
         self._trees = Kept(KEPT_TREES)
         self._parts = Kept(KEPT_TREES)

@@ -238,7 +238,7 @@ def test_slider_answers_at_once_and_leaves_locked_regions_alone(api: Api) -> Non
     kept = regions(api, tool)[2]
     edit(api, tool, kind="lock", regions=[2], on=True)
     ten = api.post(path, {"target": 10, "now": True})
-    assert ten["region_count"] > 6
+    assert ten["region_count"] == 10
     lid = next(r for r in regions(api, tool) if r["name"] == "Lid")
     assert lid["area_mm2"] == pytest.approx(kept["area_mm2"], rel=1e-9)
     assert lid["locked"]
@@ -270,6 +270,23 @@ def test_one_drag_of_the_slider_is_one_step(api: Api) -> None:
     again = api.post(path, {"target": 8, "now": True})
     assert again["edit"]["step"] == 3
     assert api.post(f"{path}/undo", status=200)["region_count"] == 9
+
+
+def test_a_drag_beside_locked_regions_leaves_no_trace(api: Api) -> None:
+    """Whatever positions it went through, the cut is the one of its last position."""
+    tool = imported(api)
+    path = f"/tools/{tool['id']}/segmentations"
+    api.post(path, {"target": 6, "now": True})
+    edit(api, tool, kind="lock", regions=[1, 4], on=True)
+    api.post(path, {"target": 10, "now": True})
+    straight = regions(api, tool)
+    api.post(f"{path}/undo", status=200)
+    for target in (30, 17, 10):
+        cut = api.post(path, {"target": target, "now": True, "continues": target != 30})
+    assert cut["region_count"] == 10
+    assert cut["edit"]["locked"] == [0, 1]
+    assert regions(api, tool) == straight
+    assert api.post(f"{path}/undo", status=200)["edit"]["locked"] == [1, 4]
 
 
 def test_colours_of_the_file_stay_while_the_tool_does(api: Api, tool: dict[str, Any]) -> None:
