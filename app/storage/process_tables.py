@@ -3,8 +3,9 @@
 from sqlalchemy import CheckConstraint
 from sqlmodel import Field, SQLModel
 
+from app.storage.columns import json_column, list_column, object_column
 from app.storage.identity import new_id, now
-from app.storage.tables import Json, json_column, list_column, object_column
+from app.storage.tables import Json
 
 
 class OwnFeatureRow(SQLModel, table=True):

@@ -6,49 +6,16 @@ JSON columns are replaced as a whole: a change inside one would be lost.
 
 from typing import Any
 
-from sqlalchemy import JSON, CheckConstraint, Column, ForeignKey, Index, text
+from sqlalchemy import CheckConstraint, Index, text
 from sqlmodel import Field, SQLModel
 
+from app.storage.columns import json_column, list_column, object_column, one_of, owned
 from app.storage.identity import new_id, now
-
-SQLModel.metadata.naming_convention = {
-    "ix": "ix_%(column_0_label)s",
-    "uq": "uq_%(table_name)s_%(column_0_name)s",
-    "ck": "ck_%(table_name)s_%(constraint_name)s",
-    "fk": "fk_%(table_name)s_%(column_0_name)s_%(referred_table_name)s",
-    "pk": "pk_%(table_name)s",
-}
 
 RUN_STATES = ("queued", "training", "waiting_for_expert", "converged", "stalled", "infeasible", "failed", "cancelled")
 ACTIVE_RUN_STATES = ("queued", "training", "waiting_for_expert")
 JOB_STATES = ("queued", "running", "done", "failed", "cancelled")
 Json = dict[str, Any]
-
-
-def one_of(column: str, *values: str) -> CheckConstraint:
-    """CHECK that a text column holds one of `values`."""
-    listed = ", ".join(f"'{value}'" for value in values)
-    return CheckConstraint(f"{column} IN ({listed})", name=column)
-
-
-def json_column(nullable: bool = False) -> Any:
-    """A JSON column; None becomes SQL NULL."""
-    return Field(default=None, sa_column=Column(JSON(none_as_null=True), nullable=nullable))
-
-
-def list_column() -> Any:
-    """A JSON column that starts as []."""
-    return Field(default_factory=list, sa_column=Column(JSON(none_as_null=True), nullable=False, server_default="[]"))
-
-
-def object_column() -> Any:
-    """A JSON column that starts as {}."""
-    return Field(default_factory=dict, sa_column=Column(JSON(none_as_null=True), nullable=False, server_default="{}"))
-
-
-def owned(target: str, nullable: bool = False) -> Any:
-    """A foreign key with an index."""
-    return Field(default=None, sa_column=Column(ForeignKey(target), nullable=nullable, index=True))
 
 
 class Project(SQLModel, table=True):
@@ -135,8 +102,8 @@ class Segmentation(SQLModel, table=True):
         default="cut", sa_column_kwargs={"server_default": "cut"}
     )  # of the edit: merge, split_plane, ..., or cut for a cut by parameters
     words: str = Field(default="Read in", sa_column_kwargs={"server_default": "Read in"})  # the edit, for people: "Merged B and C"
-    locked: list[int] = Field(default_factory=list, sa_column=Column(JSON(none_as_null=True), nullable=False, server_default="[]"))
-    hidden: list[int] = Field(default_factory=list, sa_column=Column(JSON(none_as_null=True), nullable=False, server_default="[]"))
+    locked: list[int] = list_column()
+    hidden: list[int] = list_column()
     created_at: str = Field(default_factory=now)
 
 
