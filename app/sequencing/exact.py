@@ -22,7 +22,7 @@ from app.sequencing.problem import SequencingProblem
 from app.sequencing.rows import Single
 from app.sequencing.structure import Sets
 
-THREADS_FROM = 22  # regions; below, one thread is quick enough, and two that wait for each other are slow on a busy machine
+THREADS_FROM = 24  # regions; below, one thread is quick enough, and two that wait for each other are slow on a busy machine
 CHUNK = 1 << 14  # sets evaluated at a time
 NO_TABLE = np.zeros((0, 0))
 
