@@ -1,11 +1,13 @@
 """What each region is like: area, normal, curvature, kind, height, plan view."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.geometry.compiled import kernel
+from app.geometry.exact_shapes import Shape
 from app.geometry.fitting import AREA, CYLINDER, KINDS, NORMAL_WEIGHT, SPHERE, fit, sums_about
 from app.geometry.main_faces import is_flat
 from app.geometry.quadrics import CONE, fit_cone, fit_quadric
@@ -33,8 +35,8 @@ class Attributes:
     high: Array  # (n, 3) upper corner of the box, m
 
 
-def find_attributes(mesh: Mesh, labels: NDArray[np.int32]) -> Attributes:
-    """Measure every region."""
+def find_attributes(mesh: Mesh, labels: NDArray[np.int32], shapes: Sequence[Shape | None] | None = None) -> Attributes:
+    """Measure every region; curvature and kind are fitted where `shapes` doesn't know them."""
     n = int(labels.max()) + 1
     total = _totals(mesh.vertices, mesh.faces, labels, n)
     area, projected, centroid, normal = total[:, 0], total[:, 1], total[:, 2:5] / total[:, :1], total[:, 5:]
@@ -42,7 +44,7 @@ def find_attributes(mesh: Mesh, labels: NDArray[np.int32]) -> Attributes:
     # a region that closes on itself (a ring wall) has no mean normal; call it upright
     normal = np.where((size > 1e-6 * area)[:, None], normal / np.maximum(size, 1e-300)[:, None], [0.0, 0.0, 1.0])
     low, high = region_boxes(mesh.vertices, mesh.faces, labels, n)
-    bends = [region_shape(mesh, np.flatnonzero(labels == a)) for a in range(n)]
+    bends = [shape or region_shape(mesh, np.flatnonzero(labels == a)) for a, shape in enumerate(shapes or [None] * n)]
     curvature, kind = np.array([b for b, _ in bends]), tuple(k for _, k in bends)
     return Attributes(area, projected, centroid, normal, curvature, kind, low, high)
 

@@ -15,6 +15,7 @@ Colour = tuple[int, int, int]
 # where the CAD kernel's record of a surface keeps its point and its direction
 _POINTS = {"plane": "origin", "cylinder": "origin", "cone": "apex", "sphere": "center", "torus": "center"}
 _AXES = {"plane": "normal", "cylinder": "axis", "cone": "axis", "torus": "axis"}
+SAME = 1e-5  # share of the part's size, and rad, within which two faces lie on one surface
 _RADII = {"cylinder": "radius", "sphere": "radius", "torus": "major_radius"}
 
 
@@ -43,6 +44,29 @@ class CadFace:
 def _triple(values: Any) -> Point:
     x, y, z = (float(v) for v in values)
     return x, y, z
+
+
+def same_surface(a: CadFace, b: CadFace, size: float) -> bool:
+    """Whether two faces lie on one plane, cylinder, cone, sphere or torus; freeform ones never do.
+
+    Args:
+        a: A face.
+        b: Another one.
+        size: Of the part, in its unit.
+    """
+    if a.kind != b.kind or a.point is None or b.point is None:
+        return False
+    sizes = [((getattr(a, name) or 0.0) - (getattr(b, name) or 0.0)) / size for name in ("radius", "minor_radius")]
+    if max(*np.abs(sizes), abs((a.half_angle or 0.0) - (b.half_angle or 0.0))) > SAME:
+        return False
+    apart = np.subtract(a.point, b.point) / size
+    if a.axis is not None and b.axis is not None:
+        axis = np.array(a.axis)
+        if np.linalg.norm(np.cross(axis, b.axis)) > SAME:
+            return False
+        along = (apart @ axis) * axis
+        apart = {"plane": along, "cylinder": apart - along}.get(a.kind, apart)
+    return float(np.linalg.norm(apart)) <= SAME
 
 
 def from_record(record: dict[str, Any] | None) -> CadFace:

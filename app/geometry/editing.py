@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from app.errors import InvalidInput
 from app.geometry.cleaning import areas, face_pairs, shared_length
+from app.geometry.exact_shapes import known_shape
 from app.geometry.regions import measure_labelled
 from app.geometry.slicing import Integers, Sliced, split_edges
 from app.geometry.splitting import connected
@@ -200,7 +201,8 @@ def finish(tool: Tool, sliced: Sliced, labels: Integers) -> Edited:
     compact = np.full(len(labels), -1, np.int32)
     compact[labels >= 0] = np.searchsorted(present, labels[labels >= 0])
     changed = tuple(a for a in range(tool.n) if a not in kept)
-    return Edited(measure_labelled(sliced.mesh, compact, names), kept, changed, sliced.source)
+    shapes = [known_shape(tool, a) if a != NEW else None for a in kept.tolist()]
+    return Edited(measure_labelled(sliced.mesh, compact, names, shapes), kept, changed, sliced.source)
 
 
 def _reconnect(mesh: Mesh, labels: Integers) -> Integers:

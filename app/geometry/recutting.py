@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from app.geometry.carry_over import map_regions
 from app.geometry.cleaning import areas, face_pairs, shared_length
+from app.geometry.exact_shapes import CadSurfaces, known_shape
 from app.geometry.importing import ImportedPart
 from app.geometry.merge_tree import MergeTree
 from app.geometry.pieces import tree_for
@@ -56,7 +57,7 @@ def recut(
         patches = patches or beside_locked(before, locked, find_patches(part, parameters, tree), tree, here)
         return recut_around(before, locked, part, parameters, here, patches)
     cut = segment(part, parameters, report, tree, patches)
-    tool = measure(cut.part.mesh, cut.labels)
+    tool = measure(cut.part.mesh, cut.labels, CadSurfaces(cut.part.cad_face, cut.part.cad_faces))
     return Recut(tool if before is None else _with_given_names(before, tool), (), cut.tree)
 
 
@@ -108,7 +109,8 @@ def recut_around(
     count = int(labels.max()) + 1
     free = [name for name in region_letters(count + len(kept)) if name not in kept]
     names = [*kept, *free[: count - len(kept)]]
-    return Recut(measure_labelled(made.part.mesh, labels, names), tuple(range(len(kept))), made.tree)
+    shapes = [known_shape(tool, a) for a in sorted(locked)] + [None] * count
+    return Recut(measure_labelled(made.part.mesh, labels, names, shapes[:count]), tuple(range(len(kept))), made.tree)
 
 
 def _cut_beside(

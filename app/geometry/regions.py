@@ -11,6 +11,7 @@ from app.geometry.borders import corner_neighbours, find_borders, opposite_lengt
 from app.geometry.cleaning import face_pairs
 from app.geometry.descriptions import describe
 from app.geometry.distances import surface_distances
+from app.geometry.exact_shapes import CadSurfaces, Shape, exact_shapes
 from app.geometry.fitting import NORMAL_WEIGHT, add_up, face_sums
 from app.geometry.main_faces import facing
 from app.geometry.merging import absorb_small, build_tree
@@ -20,12 +21,13 @@ from app.geometry.tool import Array, Mesh, Region, RegionGraph, Tool, region_let
 ROW_OVERLAP = 0.5  # share of the smaller region's depth that two regions of one row have in common
 
 
-def measure(mesh: Mesh, labels: NDArray[np.int32]) -> Tool:
+def measure(mesh: Mesh, labels: NDArray[np.int32], cad: CadSurfaces | None = None) -> Tool:
     """Build the tool of a segmented mesh.
 
     Args:
         mesh: The whole part.
         labels: (F,) any numbers >= 0 per region, -1 outside the working surface; each region connected.
+        cad: The CAD model's own surfaces, where the mesh comes from one.
 
     Returns:
         The tool; its regions are renumbered row by row from the rear left, so region i has the i-th letter.
@@ -39,12 +41,22 @@ def measure(mesh: Mesh, labels: NDArray[np.int32]) -> Tool:
     compact = np.full(len(labels), -1, np.int32)
     compact[inside] = np.unique(labels[inside], return_inverse=True)[1].ravel()
     rank = np.argsort(reading_order(*_plan_boxes(mesh, compact)))
-    return measure_labelled(mesh, np.where(inside, rank[compact], -1).astype(np.int32))
+    ordered = np.where(inside, rank[compact], -1).astype(np.int32)
+    return measure_labelled(mesh, ordered, shapes=None if cad is None else exact_shapes(mesh, ordered, cad))
 
 
-def measure_labelled(mesh: Mesh, labels: NDArray[np.int32], names: Sequence[str] | None = None) -> Tool:
-    """Build the tool of a mesh whose regions are numbered 0, 1, ... already, and named unless letters will do."""
-    attributes = find_attributes(mesh, labels)
+def measure_labelled(
+    mesh: Mesh, labels: NDArray[np.int32], names: Sequence[str] | None = None, shapes: Sequence[Shape | None] | None = None
+) -> Tool:
+    """Build the tool of a mesh whose regions are numbered 0, 1, ... already.
+
+    Args:
+        mesh: The whole part.
+        labels: (F,) region of each face, -1 outside the working surface.
+        names: What the regions are called; letters without.
+        shapes: Curvature and kind of the regions of which they are known; all others are fitted.
+    """
+    attributes = find_attributes(mesh, labels, shapes)
     graph = _graph(mesh, labels, attributes)
     return Tool(mesh, labels, _regions(attributes, names), graph)
 

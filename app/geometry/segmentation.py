@@ -15,6 +15,7 @@ from app.errors import InvalidInput, UnreadableMesh
 from app.geometry.cleaning import face_pairs
 from app.geometry.compiled import kernel
 from app.geometry.denoise import denoised
+from app.geometry.exact_shapes import CadSurfaces, by_surface, surface_of
 from app.geometry.fitting import AREA, NORMAL_WEIGHT, PLANE, PRODUCT, add_up, face_sums
 from app.geometry.importing import ImportedPart
 from app.geometry.merge_tree import Integers, MergeTree
@@ -112,7 +113,11 @@ def segment(
 def find_patches(part: ImportedPart, parameters: SegmentationParameters, tree: MergeTree) -> Patches:
     """The patches of a part that its tolerance asks for, and that can be reached."""
     pairs, sums = face_pairs(part.mesh.faces), unit_sums(_fitted(part, parameters.denoise))
-    labels = _working_patches(tree.cut(tolerance=parameters.tolerance), reachable(part.mesh), sums[:, AREA])
+    found = tree.cut(tolerance=parameters.tolerance)
+    if part.cad_faces:
+        surface = surface_of(part.cad_faces, float(np.linalg.norm(np.ptp(part.mesh.vertices, axis=0))))
+        found = by_surface(found, CadSurfaces(part.cad_face, part.cad_faces), surface, pairs)
+    labels = _working_patches(found, reachable(part.mesh), sums[:, AREA])
     return Patches(labels, add_up(sums, labels), _label_pairs(labels, pairs))
 
 

@@ -1,17 +1,24 @@
 """Segmentation against surfaces whose primitives are known, and on public CAD files."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
 from numpy.typing import NDArray
 
 from app.benches.composites import noisy, rand_index, strip
+from app.geometry.cad_faces import CadFace
 from app.geometry.cleaning import CleaningReport
+from app.geometry.editing import merge
+from app.geometry.exact_shapes import CadSurfaces, exact_shapes
 from app.geometry.importing import ImportedPart, load_part
 from app.geometry.moulds import Piece, solid, straight, trace, translational
-from app.geometry.segmentation import SegmentationParameters, part_tree, segment
+from app.geometry.regions import measure
+from app.geometry.segmentation import SegmentationParameters, find_patches, part_tree, segment
 from app.geometry.tool import Mesh
 from tests.conftest import shared
+from tests.geometry.test_regions import surface
 
 BEND = np.radians(60)
 TRUE_PARTS = 5  # plane, concave cylinder, plane, convex cylinder, plane
@@ -119,3 +126,51 @@ def test_a_kept_tree_gives_the_same_cut() -> None:
     first = segment(part, SegmentationParameters(target=7))
     again = segment(part, SegmentationParameters(target=7), tree=part_tree(part))
     assert (first.labels == again.labels).all()
+
+
+def creased(turn: float) -> ImportedPart:
+    """A level sheet of two CAD faces, then one that turns up by `turn`, then a wall of a cylinder of 0.1 m."""
+    t = np.linspace(0, np.pi / 2, 13)
+    flat = [(0.0, 0.0), (0.2, 0.0), (0.4, 0.0), (0.4 + 0.4 * np.cos(turn), 0.4 * np.sin(turn))]
+    x, z = np.array([*flat, *zip(flat[-1][0] + 0.1 * np.sin(t[1:]), flat[-1][1] + 0.1 * (1 - np.cos(t[1:])), strict=True)]).T
+    grid = np.stack([np.stack([x, np.full_like(x, y), z], -1) for y in (0.0, 0.2, 0.4)], axis=1)
+    mesh, labels = surface(grid, np.repeat(np.minimum(np.arange(len(x) - 1), 3)[:, None], 2, axis=1))
+    faces = (
+        CadFace("plane", (0.1, 0.1, 0.0), (0.0, 0.0, 1.0)),
+        CadFace("plane", (0.3, 0.3, 0.0), (0.0, 0.0, -1.0)),
+        CadFace("plane", (flat[-1][0], 0.0, flat[-1][1]), (-np.sin(turn), 0.0, np.cos(turn))),
+        CadFace("cylinder", (flat[-1][0], 0.0, flat[-1][1] + 0.1), (0.0, 1.0, 0.0), radius=0.1),
+    )
+    return ImportedPart(mesh, labels, CleaningReport(()), faces)
+
+
+def test_cad_faces_on_one_surface_are_one_patch_and_others_are_not() -> None:
+    """The first strip of the cylinder is within the tolerance of the plane beside it; to the CAD model it isn't on it."""
+    part = creased(np.radians(5))
+    found = find_patches(part, SegmentationParameters(), part_tree(part)).labels
+    first = [np.unique(found[part.cad_face == k]).tolist() for k in range(4)]
+    assert first[0] == first[1]
+    assert sorted(first[1:]) == [[0], [1], [2]]
+    alone = replace(part, cad_face=np.full_like(part.cad_face, -1), cad_faces=())
+    fitted = find_patches(alone, SegmentationParameters(), part_tree(alone)).labels
+    assert len(np.unique(fitted[part.cad_face == 3])) == 2
+
+
+def test_regions_are_what_the_cad_model_says() -> None:
+    """The cylinder with a strip of the plane beside it: no fit, but the model's radius; hollow upwards is negative."""
+    part = creased(np.radians(10))
+    together = np.where(part.cad_face == 0, 0, 1).astype(np.int32)
+    cad = CadSurfaces(part.cad_face, part.cad_faces)
+    assert exact_shapes(part.mesh, np.where(part.cad_face == 3, 1, 0).astype(np.int32), cad)[1] == (-10.0, "cylinder")
+    assert exact_shapes(part.mesh, together, cad) == ((0.0, "plane"), None)
+    tool = measure(part.mesh, part.cad_face, cad)
+    assert sorted(r.kind for r in tool.regions) == ["cylinder", "plane", "plane", "plane"]
+
+
+def test_an_edit_leaves_what_other_regions_are() -> None:
+    part = creased(np.radians(10))
+    tool = measure(part.mesh, part.cad_face, CadSurfaces(part.cad_face, part.cad_faces))
+    given = tuple(replace(r, kind="cone", curvature=3.0) if r.kind == "cylinder" else r for r in tool.regions)
+    after = merge(replace(tool, regions=given), [0, 1]).tool
+    assert [(r.kind, r.curvature) for r in after.regions if r.curvature] == [("cone", 3.0)]
+    assert after.n == 3
