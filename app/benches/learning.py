@@ -8,6 +8,7 @@ import numpy as np
 
 from app.benches.effort_figures import effort_figures
 from app.benches.figures import Figure, Options
+from app.benches.noisy import noisy_figures
 from app.benches.studies import demonstrations
 from app.errors import InvalidInput
 from app.learning.certified import certify
@@ -26,6 +27,7 @@ from app.sequencing.classes import equivalent_sequences
 from app.sequencing.features import FEATURE_SETS
 
 SEEDS, QUICK_SEEDS = 30, 3
+ERRING = 20  # experts who err, each with three kinds of errors, answers checked and not
 REPEATS = 20
 ANSWERS = 3
 DRAWS = 3  # of candidate orders per tool
@@ -43,6 +45,7 @@ def measure(options: Options) -> Iterator[Figure]:
     yield from _real(options.data, options.quick)
     yield from _speed(synthetic)
     yield from effort_figures(synthetic)
+    yield from noisy_figures(synthetic, QUICK_SEEDS if options.quick else ERRING)
 
 
 def _synthetic(shown: Shown) -> Iterator[Figure]:
