@@ -29,7 +29,7 @@ from app.geometry.working_surface import reachable
 Report = Callable[[float, str], None]
 MOST_TARGET = 60
 FILLET_WIDTH = 0.06  # of the diagonal; wider roundings are regions of their own
-SIMILAR_LEAST, SIMILAR_MOST = 0.04, 0.13  # shares of the working surface between which the paper-like regions lie, roughly
+SIMILAR_LEAST, SIMILAR_MOST = 0.04, 0.16  # shares of the working surface between which the paper-like regions lie, roughly
 LEAST_REGIONS = 6  # fewer primitives than this are cut further, as one region leaves nothing to sequence
 
 

@@ -1,11 +1,13 @@
 """Cut large regions into near-equal parts by planes; triangles are split where a plane runs, so borders are straight.
 
-A region is cut in the rectangle that encloses it most tightly: first into rows, then the rows into columns. Every triangle at
+A region is cut in the rectangle that encloses it most tightly: first into rows, then the rows into columns, where it can along
+planes that a larger region was cut along before, so that rows line up. Every triangle at
 a new vertex is split on both sides of its edge, so a closed solid stays closed.
 
 Paper: Sec. V's regions aren't only primitives: the real tools have rows of identical patches on one surface.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,7 +23,11 @@ Integers = NDArray[np.int64]
 ON_PLANE = 1e-5  # share of the diagonal of the surface that is cut within which a vertex lies on the cutting plane
 LARGE = 0.2  # regions with a larger share of the working surface are cut
 SCRAP = 0.35  # pieces below this share of an equal part go to the piece they share most border with
-UNEVEN, EXTRA = 0.3, 0.3  # what rows of different length and one part too many cost, against the log aspect of a part
+UNEVEN = 0.5  # what rows of different length cost, against the log aspect of a part and the log of too many parts
+MOST_EXTRA = 2
+ALIGNED = 0.4  # what rows are worth that line up with those of a region cut before
+PARALLEL = np.cos(np.radians(2))
+FITTING = (0.75, 1.33)  # area of a part between such planes over that of an equal one
 SWEEP = 257  # places at which the area before is known
 ROUNDS = 4  # scraps leave fewer parts than planned; so often we cut again
 
@@ -45,19 +51,31 @@ class Surface:
 
 def split_large(surface: Surface, least: int, most: int, large: float = LARGE) -> Surface:
     """Cut the largest regions until there are `least` and none has a larger share than `large`, but never more than `most`."""
+    known: list[Planes] = []
     for _ in range(ROUNDS):
         shares = surface.shares()
         parts = _parts(shares, least, most, large)
         if (parts == 1).all():
             break
         room = most - int(parts.sum())
-        for region in np.flatnonzero(parts > 1):
+        for region in np.argsort(-shares, kind="stable"):
+            if parts[region] == 1:
+                continue
             apart = _taken_out(surface, int(region))
             free = int(surface.labels.max()) + 1
-            near, extra = _split(apart.near, int(region), int(parts[region]), room > 0, free)
+            near, extra, planes = _split(apart.near, int(region), int(parts[region]), min(room, MOST_EXTRA), free, known)
             surface = _put_back(surface, replace(apart, near=near))
+            known += planes
             room -= extra
     return surface
+
+
+@dataclass(frozen=True)
+class Planes:
+    """Parallel planes along which a region is cut."""
+
+    normal: Array  # (3,) unit
+    offsets: Array  # (K,) ascending, m
 
 
 @dataclass(frozen=True)
@@ -142,33 +160,55 @@ def _parts(shares: Array, least: int, most: int, large: float) -> Integers:
     return parts
 
 
-def _split(surface: Surface, region: int, parts: int, spare: bool, free: int) -> tuple[Surface, int]:
-    """Cut one region into parts named from `free` on, one more when that is `spare` and fits better; also how many more."""
+def _split(surface: Surface, region: int, parts: int, spare: int, free: int, known: Sequence[Planes]) -> tuple[Surface, int, list[Planes]]:
+    """Cut one region into parts named from `free` on, up to `spare` more when that fits better; also how many more, and where."""
     frame, size = rectangle(surface, region)
-    planned, rows = _layout(parts, size[0] / max(size[1], 1e-9 * size[0]), spare)
+    like = [_in_line(surface, region, side, parts + spare, known) for side in frame]
+    planned, rows = _layout(parts, size[0] / max(size[1], 1e-9 * size[0]), spare, [[p is not None for p in side] for side in like])
     per_row = [planned // rows + (r < planned % rows) for r in range(rows)]
-    surface, marked = _cut_along(surface, region, frame[0], np.cumsum(per_row)[:-1] / planned)
+    surface, marked = _cut_along(
+        surface, region, frame[0], np.cumsum(per_row)[:-1] / planned, like[0][rows] if planned % rows == 0 else None
+    )
+    used = [marked]
     if planned % rows == 0:
-        surface, columns = _cut_along(surface, region, frame[1], np.arange(1, per_row[0]) / per_row[0])
+        surface, columns = _cut_along(surface, region, frame[1], np.arange(1, per_row[0]) / per_row[0], like[1][per_row[0]])
         inside = surface.labels == region
-        row = _cell(surface, inside, frame[0], marked)
-        cells = row * per_row[0] + _cell(surface, inside, frame[1], columns)
+        cells = _cell(surface, inside, marked) * per_row[0] + _cell(surface, inside, columns)
+        used.append(columns)
     else:
         surface, cells = _cut_rows(surface, region, frame, marked, per_row)
-    return _gather(surface, region, cells, planned, free), planned - parts
+    return _gather(surface, region, cells, planned, free), planned - parts, [p for p in used if len(p.offsets)]
 
 
-def _cut_rows(surface: Surface, region: int, frame: Array, marked: Array, per_row: list[int]) -> tuple[Surface, Integers]:
+def _in_line(surface: Surface, region: int, direction: Array, most: int, known: Sequence[Planes]) -> list[Planes | None]:
+    """For 0, 1, ... `most` parts, planes across a direction that are known already and cut a region into about equal ones."""
+    found: list[Planes | None] = [None] * (most + 1)
+    faces = surface.faces[surface.labels == region]
+    for planes in known:
+        if abs(planes.normal @ direction) < PARALLEL:
+            continue
+        corners, area = (surface.vertices @ planes.normal)[faces], areas(surface.vertices, faces)
+        grid = np.linspace(corners.min(), corners.max(), SWEEP)
+        before = np.interp(planes.offsets, grid, _area_before(corners, area, grid) / area.sum())
+        for count in range(2, most + 1):
+            nearest = np.abs(before[:, None] - np.arange(1, count) / count).argmin(axis=0)
+            share = np.diff([0.0, *before[nearest], 1.0]) * count
+            if found[count] is None and FITTING[0] <= share.min() and share.max() <= FITTING[1]:
+                found[count] = Planes(planes.normal, planes.offsets[nearest])
+    return found
+
+
+def _cut_rows(surface: Surface, region: int, frame: Array, marked: Planes, per_row: list[int]) -> tuple[Surface, Integers]:
     """Cut rows of different length into columns each; the surface and the cell of each face of the region."""
     aside = int(surface.labels.max()) + 1
     inside = surface.labels == region
     labels = surface.labels.copy()
-    labels[inside] = aside + _cell(surface, inside, frame[0], marked)
+    labels[inside] = aside + _cell(surface, inside, marked)
     surface = replace(surface, labels=labels)
     cell = np.full(len(labels), -1, np.int64)
     for r, n in enumerate(per_row):
         surface, columns = _cut_along(surface, aside + r, frame[1], np.arange(1, n) / n)
-        per_row_columns = _cell(surface, surface.labels == aside + r, frame[1], columns)
+        per_row_columns = _cell(surface, surface.labels == aside + r, columns)
         labels = surface.labels.copy()
         labels[surface.labels == aside + r] = aside + len(per_row) + sum(per_row[:r]) + per_row_columns
         surface = replace(surface, labels=labels)
@@ -177,13 +217,14 @@ def _cut_rows(surface: Surface, region: int, frame: Array, marked: Array, per_ro
     return replace(surface, labels=np.where(inside, region, surface.labels)), cell
 
 
-def _cut_along(surface: Surface, region: int, direction: Array, fractions: Array) -> tuple[Surface, Array]:
-    """Cut a region where the given fractions of its area lie before; also the offsets of the planes."""
-    faces = surface.faces[surface.labels == region]
-    offsets = quantiles((surface.vertices @ direction)[faces], areas(surface.vertices, faces), fractions)
-    for offset in offsets:
-        surface = cut_by_plane(surface, region, direction, float(offset))
-    return surface, offsets
+def _cut_along(surface: Surface, region: int, direction: Array, fractions: Array, given: Planes | None = None) -> tuple[Surface, Planes]:
+    """Cut a region along the given planes, or where the given fractions of its area lie before; also the planes."""
+    if given is None:
+        faces = surface.faces[surface.labels == region]
+        given = Planes(direction, quantiles((surface.vertices @ direction)[faces], areas(surface.vertices, faces), fractions))
+    for offset in given.offsets:
+        surface = cut_by_plane(surface, region, given.normal, float(offset))
+    return surface, given
 
 
 def quantiles(corners: Array, area: Array, fractions: Array) -> Array:
@@ -211,10 +252,10 @@ def _area_before(corners, area, grid):  # pragma: no cover - compiled
     return before + np.cumsum(whole)[:-1]
 
 
-def _cell(surface: Surface, inside: NDArray[np.bool_], direction: Array, offsets: Array) -> Integers:
+def _cell(surface: Surface, inside: NDArray[np.bool_], planes: Planes) -> Integers:
     """Number of planes before the middle of each chosen face."""
-    a, b, c = (surface.vertices @ direction)[surface.faces[inside]].T
-    return np.searchsorted(offsets, (a + b + c) / 3).astype(np.int64)
+    a, b, c = (surface.vertices @ planes.normal)[surface.faces[inside]].T
+    return np.searchsorted(planes.offsets, (a + b + c) / 3).astype(np.int64)
 
 
 def rectangle(surface: Surface, region: int) -> tuple[Array, Array]:
@@ -232,12 +273,13 @@ def rectangle(surface: Surface, region: int) -> tuple[Array, Array]:
     return axes[order] @ plane, sides[order]
 
 
-def _layout(parts: int, aspect: float, spare: bool) -> tuple[int, int]:
-    """Number of parts and of rows across the long side that make the parts squarest."""
+def _layout(parts: int, aspect: float, spare: int, like: Sequence[Sequence[bool]]) -> tuple[int, int]:
+    """Number of parts and of rows across the long side that make the parts squarest, rows `like` others preferred."""
 
     def effort(planned: int, rows: int) -> float:
-        squareness = abs(np.log(aspect / rows * (planned / rows)))
-        return float(squareness + UNEVEN * (planned % rows > 0) + EXTRA * (planned - parts))
+        squareness, even = abs(np.log(aspect / rows * (planned / rows))), planned % rows == 0
+        aligned = even and (like[0][rows] or like[1][planned // rows])
+        return float(squareness + UNEVEN * (not even) + np.log(planned / parts) - ALIGNED * aligned)
 
     choices = [(planned, rows) for planned in range(parts, parts + 1 + spare) for rows in range(1, planned + 1)]
     return min(choices, key=lambda c: effort(*c))

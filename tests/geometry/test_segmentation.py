@@ -16,6 +16,7 @@ from app.geometry.importing import ImportedPart, load_part
 from app.geometry.moulds import Piece, solid, straight, trace, translational
 from app.geometry.regions import measure
 from app.geometry.segmentation import SegmentationParameters, find_patches, part_tree, segment
+from app.geometry.splitting import Surface, split_large
 from app.geometry.tool import Mesh
 from tests.conftest import shared
 from tests.geometry.test_regions import surface
@@ -174,3 +175,28 @@ def test_an_edit_leaves_what_other_regions_are() -> None:
     after = merge(replace(tool, regions=given), [0, 1]).tool
     assert [(r.kind, r.curvature) for r in after.regions if r.curvature] == [("cone", 3.0)]
     assert after.n == 3
+
+
+def test_panels_of_two_bands_line_up() -> None:
+    """A band of 1 m x 0.3 m beside one of 1 m x 0.12 m whose middle lies elsewhere: cut alone, their borders wouldn't meet."""
+    x, y = np.meshgrid(np.linspace(0, 1, 41), [0.0, 0.15, 0.3, 0.36, 0.42], indexing="ij")
+    x = x + np.where(y > 0.35, 0.02 * x, 0)
+    mesh, labels = surface(np.stack([x, y, np.zeros_like(x)], -1), np.tile([0, 0, 1, 1], (40, 1)))
+    start = Surface(mesh.vertices, mesh.faces.astype(np.int64), np.full(len(labels), -1, np.int32), labels.astype(np.int64), labels)
+    cut = split_large(start, 6, 14, 0.2)
+    middle = cut.vertices[cut.faces].mean(axis=1)
+    ends = []
+    for band in (middle[:, 1] < 0.3, middle[:, 1] > 0.3):
+        ends.append({round(float(cut.vertices[cut.faces[cut.labels == k], 0].max()), 6) for k in np.unique(cut.labels[band])})
+    wide, narrow = (set(sorted(e)[:-1]) for e in ends)
+    assert len(wide) >= 2
+    assert narrow
+    assert narrow <= wide
+
+
+def test_a_square_becomes_even_rows() -> None:
+    """Seven wanted at least: nine squares in three rows rather than rows of two, two and three."""
+    x, y = np.meshgrid(np.linspace(0, 1, 13), np.linspace(0, 1, 13), indexing="ij")
+    mesh, labels = surface(np.stack([x, y, np.zeros_like(x)], -1), np.zeros((12, 12), int))
+    start = Surface(mesh.vertices, mesh.faces.astype(np.int64), np.full(len(labels), -1, np.int32), labels.astype(np.int64), labels)
+    assert split_large(start, 6, 14, 0.16).shares() == pytest.approx(np.full(9, 1 / 9))
