@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from app.geometry.compiled import kernel
 from app.geometry.exact_shapes import Shape
-from app.geometry.fitting import AREA, CYLINDER, KINDS, NORMAL_WEIGHT, SPHERE, fit, sums_about
+from app.geometry.fitting import AREA, CYLINDER, KINDS, NORMAL2, NORMAL2_AT, NORMAL_CENTRE, NORMAL_WEIGHT, SPHERE, fit, sums_about
 from app.geometry.main_faces import is_flat
 from app.geometry.quadrics import CONE, fit_cone, fit_quadric
 from app.geometry.tool import Array, Mesh
@@ -135,9 +135,17 @@ def _primitive(sums: Array) -> tuple[str, float]:
     elif cost > allowed:
         return ("curved" if fit_quadric(sums, NORMAL_WEIGHT, np.empty(10)) <= allowed else "freeform"), 0.0
     kind = int(out[0])
+    if kind == SPHERE and _straight_one_way(sums):
+        kind = CYLINDER
     if kind in (SPHERE, CYLINDER, CONE) and abs(out[1]) < FLAT_TURN:
         return "plane", 0.0
     return KINDS[kind], float(out[1])
+
+
+def _straight_one_way(sums: Array) -> bool:
+    """Whether normals turn so little in one direction that a sphere is as good as a cylinder: the narrow wall around a plate."""
+    turn = np.linalg.eigvalsh(sums[NORMAL2:NORMAL_CENTRE][NORMAL2_AT])[0] / sums[AREA]
+    return bool(turn < FLAT_TURN**2 / 12)
 
 
 def turning_curvature(corners: Array) -> float:

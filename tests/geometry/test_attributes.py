@@ -212,3 +212,11 @@ def test_a_flat_plate_with_a_wall_at_its_edge_is_a_plane() -> None:
     """A level plate and the wall of a slot, a fifth as large: one region, still a plane."""
     tool = profile([(0, 0), (0.5, 0), (0.5, 0.1)], [0, 0])
     assert (tool.regions[0].kind, tool.regions[0].curvature) == ("plane", 0)
+
+
+def test_the_narrow_wall_around_a_plate_is_a_cylinder() -> None:
+    """A band of a sphere of 0.4 m, 10 mm high: its normals turn by 1.4 degrees upwards, which is nothing to call it a sphere for."""
+    t, z = np.meshgrid(np.linspace(0, 5, 60), np.linspace(-0.005, 0.005, 5), indexing="ij")
+    r = np.sqrt(0.16 - z**2)
+    region = measure(*surface(np.stack([r * np.cos(t), r * np.sin(t), z], -1), np.zeros((59, 4), int))).regions[0]
+    assert (region.kind, region.curvature) == ("cylinder", pytest.approx(2.5, rel=0.02))
