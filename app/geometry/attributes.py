@@ -7,11 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.geometry.compiled import kernel
-from app.geometry.exact_shapes import Shape
 from app.geometry.fitting import AREA, CYLINDER, KINDS, NORMAL2, NORMAL2_AT, NORMAL_CENTRE, NORMAL_WEIGHT, SPHERE, fit, sums_about
 from app.geometry.main_faces import is_flat
 from app.geometry.quadrics import CONE, fit_cone, fit_quadric
 from app.geometry.tool import Array, Mesh
+
+Shape = tuple[float, str]  # signed dominant curvature, 1/m, and kind
 
 # RMS cost of a primitive / size of the region above which it is called something else: facets of true primitives stay under
 # 2e-4, a doubly curved patch (Hood's crown, radii 0.20 m and 0.53 m) reaches 3.5e-3, a plane with its fillet 8e-3

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from app.geometry.attributes import Shape, turning_curvature
 from app.geometry.cad_faces import CadFace, same_surface
 from app.geometry.cleaning import joined
 from app.geometry.tool import Array, Mesh, Tool
 
-Shape = tuple[float, str]  # signed dominant curvature, 1/m, and kind
 SIMPLE = ("plane", "cylinder", "cone", "sphere")
 MOSTLY = 0.6  # share of a region's area on one surface from which it is what that surface is, holes and fillets aside
 
@@ -50,7 +50,10 @@ def by_surface(labels: NDArray[np.int64], cad: CadSurfaces, surface: NDArray[np.
 
 
 def exact_shapes(mesh: Mesh, labels: NDArray[np.int32], cad: CadSurfaces) -> tuple[Shape | None, ...]:
-    """Curvature and kind of every region of which most lies on one plane, cylinder, cone or sphere of the model; else None."""
+    """Curvature and kind of every region of which most lies on one plane, cylinder, cone or sphere of the model; else None.
+
+    A region of several planes is freeform: a cylinder may fit it, but there is an edge in it.
+    """
     n = int(labels.max()) + 1
     if not len(cad.cad_faces):
         return (None,) * n
@@ -65,11 +68,12 @@ def exact_shapes(mesh: Mesh, labels: NDArray[np.int32], cad: CadSurfaces) -> tup
         on = mine[place[mine] >= 0]
         share = np.bincount(place[on], weights=twice[on], minlength=1)
         main = int(np.argmax(share))
-        if share[main] < MOSTLY * twice[mine].sum() or cad.cad_faces[main].kind not in SIMPLE:
-            shapes.append(None)
-            continue
-        chosen = on[place[on] == main]
-        shapes.append((_curvature(cad.cad_faces[main], corners[chosen], cross[chosen]), cad.cad_faces[main].kind))
+        if share[main] >= MOSTLY * twice[mine].sum() and cad.cad_faces[main].kind in SIMPLE:
+            chosen = on[place[on] == main]
+            shapes.append((_curvature(cad.cad_faces[main], corners[chosen], cross[chosen]), cad.cad_faces[main].kind))
+        else:
+            edged = len(on) == len(mine) and all(cad.cad_faces[k].kind == "plane" for k in np.unique(place[mine]))
+            shapes.append((turning_curvature(corners[mine]), "freeform") if edged else None)
     return tuple(shapes)
 
 

@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.errors import InvalidInput
-from app.geometry.attributes import Attributes, find_attributes, nearest_middles, region_boxes
+from app.geometry.attributes import Attributes, Shape, find_attributes, nearest_middles, region_boxes
 from app.geometry.borders import corner_neighbours, find_borders, opposite_lengths
 from app.geometry.cleaning import face_pairs
 from app.geometry.descriptions import describe
 from app.geometry.distances import surface_distances
-from app.geometry.exact_shapes import CadSurfaces, Shape, exact_shapes
+from app.geometry.exact_shapes import CadSurfaces, exact_shapes
 from app.geometry.fitting import NORMAL_WEIGHT, add_up, face_sums
 from app.geometry.main_faces import facing
 from app.geometry.merging import absorb_small, build_tree

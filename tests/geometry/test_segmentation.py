@@ -162,8 +162,12 @@ def test_regions_are_what_the_cad_model_says() -> None:
     part = creased(np.radians(10))
     together = np.where(part.cad_face == 0, 0, 1).astype(np.int32)
     cad = CadSurfaces(part.cad_face, part.cad_faces)
-    assert exact_shapes(part.mesh, np.where(part.cad_face == 3, 1, 0).astype(np.int32), cad)[1] == (-10.0, "cylinder")
+    folded, round_one = exact_shapes(part.mesh, np.where(part.cad_face == 3, 1, 0).astype(np.int32), cad)
+    assert round_one == (-10.0, "cylinder")
     assert exact_shapes(part.mesh, together, cad) == ((0.0, "plane"), None)
+    assert folded is not None
+    assert folded[1] == "freeform"
+    assert folded[0] < 0
     tool = measure(part.mesh, part.cad_face, cad)
     assert sorted(r.kind for r in tool.regions) == ["cylinder", "plane", "plane", "plane"]
 
