@@ -32,6 +32,7 @@ ROUNDING = 1e-9  # of the sum of all numbers involved: far more than float64 can
 STEPS = 1200  # of the subgradient method
 COARSE, MIDDLE, FINE = 4000, 10_000, 30_000  # pairs of levels of the two sums: for most steps, for the rest, for the last bound
 REFINED = 0.4  # share of the steps with the middle tables
+STRIDE = 0.25  # of the steps when the larger tables take over
 PATIENCE = 30  # steps without gain before they are halved
 TINY = 1e-3  # steps this small end the search
 KEPT = 0.93  # share of the direction before that goes on
@@ -152,7 +153,8 @@ def lower_bound(
     if not r.free:
         return min(best, spent)
     ascent = Ascent(split(problem, w, r), best - spent, lambda bound: report(bound + spent))
-    for cells, share in ((COARSE, 1 - REFINED), (MIDDLE, REFINED)):
+    for cells, share, far in ((COARSE, 1 - REFINED, 1.0), (MIDDLE, REFINED, STRIDE)):
+        ascent.far = far
         if ascent.climb(cells, max(1, round(share * steps)), should_stop):
             break
     ascent.try_out(FINE)

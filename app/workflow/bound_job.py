@@ -16,7 +16,7 @@ from app.jobs.dispatcher import Handler
 from app.jobs.rows import add_job, cancel_jobs
 from app.jobs.worker import Report
 from app.learning.qp import Array
-from app.sequencing.bounds import COARSE, FINE, MIDDLE, TINY, Ascent
+from app.sequencing.bounds import COARSE, FINE, MIDDLE, STRIDE, TINY, Ascent
 from app.sequencing.constraints import Constraints, resolve
 from app.sequencing.parts import split
 from app.sequencing.problem import SequencingProblem
@@ -33,7 +33,6 @@ KIND = "bound"
 SECONDS = 30.0  # of computing for one plan, in all
 PART_SECONDS = 1.5  # of one part
 ROUGH_SECONDS = 15.0  # with small tables, unless they give nothing more before
-STRIDE = 0.25  # of the steps when the larger tables take over
 STEPS = 100_000  # the clock ends a part
 _searches = Kept(4)  # of a worker process: how far each search is; losing it costs only time
 
