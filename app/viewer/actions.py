@@ -29,6 +29,7 @@ class Actions:
     cad_colours: Callable[[str], tuple[Rgb | None, ...]]
     file_preview: Callable[[str, str], Preview]
     pick: Callable[..., Any]
+    pick_up: Callable[[str, str], Any]
     select: Callable[[str, list[int]], Any]
     command: Callable[[str, str], Any]
     subscribe: Callable[[Callable[[Any], None]], Callable[[], None]]
@@ -47,6 +48,7 @@ def workflow_actions(ctx: Context) -> Actions:
         cad_colours=partial(editing_views.cad_colours, ctx),
         file_preview=partial(tools.file_preview, ctx),
         pick=partial(sessions.pick_in_view, ctx),
+        pick_up=partial(sessions.pick_up, ctx),
         select=partial(editing_views.add_regions, ctx),
         command=partial(sessions.command_in_view, ctx),
         subscribe=ctx.store.subscribe,

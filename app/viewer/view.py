@@ -71,7 +71,14 @@ class BodyClicked:
     number: int
 
 
-Task = BodyClicked | Clicked | Box | Background | Hover | Letter | Command | Refresh
+@dataclass(frozen=True)
+class UpClicked:
+    """A click on an arrow beside such a file."""
+
+    direction: str  # of the file's frame: "+x", ...
+
+
+Task = BodyClicked | UpClicked | Clicked | Box | Background | Hover | Letter | Command | Refresh
 
 
 @dataclass(frozen=True)
@@ -127,7 +134,7 @@ class View:
         self._clock = Clock()
         self.server = open_server()
         self.stage = Stage(self.server, self._clicked)
-        self._file = FileNodes(self.server, self.stage, self._body_clicked)
+        self._file = FileNodes(self.server, self.stage, self._body_clicked, self._up_clicked)
         self._file_shown: tuple[str, str, bool] | None = None
         self._pointer = Pointer(self.server, self.submit)
         self._marks = MarkNodes(self.server)
@@ -159,6 +166,9 @@ class View:
 
     async def _body_clicked(self, number: int) -> None:
         self.submit(BodyClicked(number))
+
+    async def _up_clicked(self, direction: str) -> None:
+        self.submit(UpClicked(direction))
 
     def _add_hotkeys(self) -> None:
         add = self.server.gui.add_command
@@ -229,6 +239,8 @@ class View:
                     self._pointed(self._tool, command)
             case BodyClicked(number):
                 self._actions.pick(self.sid, number)
+            case UpClicked(direction):
+                self._actions.pick_up(self.sid, direction)
             case Hover(region):
                 self._hover = region
                 self._advance()
@@ -296,7 +308,7 @@ class View:
             self._tool, self._arm, self._playback, self._playback_shown, self._dark = None, None, None, None, dark
             self._marks.forget()
             self._pointer.listen(False)
-            self._file.build(self._actions.file_preview(*wanted[:2]), dark)
+            self._file.build(self._actions.file_preview(*wanted[:2]), wanted[1], dark)
             self._file_shown = wanted
         self._file.paint(self._scene.get("body"), self._scene.get("highlight") or [], dark)
 

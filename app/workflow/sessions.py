@@ -100,6 +100,12 @@ def pick_in_view(ctx: Context, session_id: str, region: int | None, point_mm: li
         ctx.store.write(lambda session: emit(session, "session.picked", session_row["project_id"], session_id=session_id, region=region))
 
 
+def pick_up(ctx: Context, session_id: str, direction: str) -> None:
+    """A click on the arrow of a direction beside a file that is being asked about: told to the page, which has the answers so far."""
+    project_id = get_session(ctx, session_id)["project_id"]
+    ctx.store.write(lambda session: emit(session, "session.picked", project_id, session_id=session_id, up=direction))
+
+
 def command_in_view(ctx: Context, session_id: str, command: str) -> None:
     """Undo or redo in what a view records or edits, or clear what it records.
 

@@ -3,6 +3,7 @@
 //   const view = new View3D(host, { projectId, name: "main" });
 //   view.show({ mode: "sequence", tool_id, sequence, step }, "Trough 10 with your order after step 4");
 //   view.onPicked((region) => ...);
+//   view.onUp((direction) => ...);
 //
 //   view.show({ mode: "edit", tool_id }, ...)    view.change({ selection: [2, 3] })    view.onEditing((state) => ...)
 //   view.onUnder((region) => ...)                what lies under the pointer, while editing
@@ -147,6 +148,11 @@ export class View3D {
   }
 
   onPicked(handler) {
-    return listen("session.picked", ({ session_id: session, region }) => session === this.session?.id && handler(region));
+    return listen("session.picked", ({ session_id: session, region }) => session === this.session?.id && region !== undefined && handler(region));
+  }
+
+  // The arrow of a direction beside a file that is being asked about: "+x", ...
+  onUp(handler) {
+    return listen("session.picked", ({ session_id: session, up }) => session === this.session?.id && up !== undefined && handler(up));
   }
 }

@@ -6,6 +6,10 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
+from app.geometry.parsing import parse
+from app.geometry.preview import preview
+from app.viewer.file_nodes import file_camera, other_arrows
+from app.viewer.projection import project
 from tests.browser.canvas import Studio
 from tests.geometry.cad_files import exported, glb
 
@@ -29,6 +33,25 @@ def tools_page(studio: Studio) -> Page:
     studio.open("tools")
     studio.page.locator(".tool-list a").first.wait_for()
     return studio.page
+
+
+def click_arrow(page: Page, name: str, content: bytes, wanted: str) -> None:
+    """Click the arrow of a direction in the 3D view until the page has heard of it.
+
+    Software rendering draws what the page says a moment later, so that a click may meet another arrow: then from there again.
+    """
+    parsed, box = parse(content, Path(name).suffix[1:]), page.locator(".view3d iframe").first.bounding_box()
+    assert box is not None
+    for _ in range(20):
+        up = page.locator('.ask-form [name="up"]:checked').get_attribute("value") or ""
+        if up == wanted:
+            return
+        file = preview(parsed, up)
+        start, way = other_arrows(file.mesh.vertices.min(0), file.mesh.vertices.max(0), up)[wanted]
+        x, y = project((start + 0.7 * way)[None], file_camera(file, up), box["width"], box["height"])[0]
+        page.mouse.click(box["x"] + x, box["y"] + y)
+        page.wait_for_timeout(1500)
+    raise AssertionError(f"no click on the arrow of {wanted} was heard")
 
 
 def choose(page: Page, name: str, content: bytes, field: str = "#cad-file") -> None:
@@ -82,7 +105,8 @@ def test_a_dropped_part_asks_and_a_dropped_template_is_a_tool(tools_page: Page, 
 
 def test_one_of_several_bodies_and_another_later(tools_page: Page, studio: Studio, tmp_path: Path) -> None:
     """A GLB with two bodies asks which; the report says what was left out; another direction is a click away."""
-    choose(tools_page, "fixture.glb", glb((("base plate", 1.0), ("clamp", 0.5))))
+    content = glb((("base plate", 1.0), ("clamp", 0.5)))
+    choose(tools_page, "fixture.glb", content)
     form = tools_page.locator(".ask-form")
     expect(form).to_contain_text("Which of the 2 bodies is the tool?")
     expect(form.locator(".body-list label")).to_have_count(3)
@@ -93,6 +117,10 @@ def test_one_of_several_bodies_and_another_later(tools_page: Page, studio: Studi
     expect(view).to_have_attribute("aria-label", "3D view of the file fixture.glb with +z up")
     form.locator('[name="up"][value="+x"]').check()  # it stands as it would
     expect(view).to_have_attribute("aria-label", "3D view of the file fixture.glb with +x up")
+    tools_page.screenshot(path=tmp_path / "arrows.png")
+    click_arrow(tools_page, "fixture.glb", content, "-y")
+    expect(view).to_have_attribute("aria-label", "3D view of the file fixture.glb with -y up")
+    expect(form.locator('[name="up"][value="-y"]')).to_be_checked()
     with tools_page.expect_response(lambda answer: answer.url.endswith("/scene") and answer.json()["scene"].get("body") == "2"):
         form.locator('[name="body"][value="2"]').check()
     form.locator('[name="up"][value="+z"]').check()

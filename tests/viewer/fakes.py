@@ -65,6 +65,7 @@ class FakeWorkflow:
     scene: dict[str, Any] = field(default_factory=lambda: {"mode": "record", "tool_id": "t1"})
     running: dict[str, Any] = field(default_factory=lambda: {"playing": False, "time": 0.0, "speed": 1.0, "duration": None})
     picked: list[tuple[str, int]] = field(default_factory=list)
+    ups: list[tuple[str, str]] = field(default_factory=list)
     state: dict[str, Any] = field(default_factory=lambda: {"locked": [], "hidden": []})
     ready: list[str] = field(default_factory=list)
     points: list[Any] = field(default_factory=list)
@@ -125,6 +126,7 @@ class FakeWorkflow:
             cad_colours=lambda _tool: (None,) * self.tool.n,
             file_preview=lambda _tool, up: preview(two_boxes(), up),
             pick=self.pick,
+            pick_up=lambda sid, up: self.ups.append((sid, up)),
             select=self.select,
             command=self.command,
             subscribe=self.subscribe,

@@ -51,7 +51,7 @@ function unitChoices(choices, chosen, extents) {
 }
 
 function upChoices(choices, chosen, guess) {
-  return h("fieldset", {}, h("legend", {}, "Which side is worked on?"), h("p.small.muted", {}, "The direction that points up, towards the hand or the robot."),
+  return h("fieldset", {}, h("legend", {}, "Which side is worked on?"), h("p.small.muted", {}, "The direction that points up, towards the hand or the robot. Choose here, or click an arrow beside the part."),
     h("div.choices-row", {}, choices.map((direction) => h("label.choice", { dataset: direction === guess ? { tip: "Guessed: it lies flat this way" } : {} }, h("input", { type: "radio", name: "up", value: direction, required: true, checked: direction === chosen }),
       upWords(direction)))));
 }

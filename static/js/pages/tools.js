@@ -203,6 +203,7 @@ async function load(wanted) {
     state.view = new View3D(stage, { projectId: shell.projectId, name: "tools" });
     editor.attach(state.view);
     state.view.onPicked((number) => panel.node.querySelector(`.ask-form [name="body"][value="${number + 1}"]`)?.click());
+    state.view.onUp((direction) => panel.node.querySelector(`.ask-form [name="up"][value="${direction}"]`)?.click());
   }
   await open(tool.id);
   return undefined;
