@@ -118,7 +118,7 @@ def region_shape(mesh: Mesh, faces: NDArray[np.int64]) -> tuple[float, str]:
     scale = float(np.linalg.norm(high - low))
     sums = sums_about(mesh.vertices, chosen, (low + high) / 2, scale)
     kind, curvature = _primitive(sums)
-    if kind != "plane" and is_flat(mesh.vertices[chosen]):
+    if kind != "plane" and is_flat(mesh, faces):
         return 0.0, "plane"
     if kind in ("plane", "cylinder", "cone", "sphere"):
         return curvature / scale, kind

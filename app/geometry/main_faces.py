@@ -1,6 +1,6 @@
 """Which way a region looks where it meets another: its flat main face, the cylinder, cone or sphere it is, else its triangles."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,22 +59,17 @@ def facing(mesh: Mesh, labels: NDArray[np.int32], kinds: Sequence[str], mean: Ar
 
     A fillet that belongs to one of two faces turns the mean normal by up to half the angle between them, the main face not at all.
     """
-    cross = _crosses(mesh)
-    twice = np.sqrt(np.einsum("ij,ij->i", cross, cross))
     result, order = mean.copy(), np.argsort(labels, kind="stable")
     ends = np.searchsorted(labels[order], np.arange(len(kinds) + 1))
     for a, kind in enumerate(kinds):
-        mine = order[ends[a] : ends[a + 1]]
-        main = flat_face(kind, cross[mine] / np.maximum(twice[mine], 1e-300)[:, None], twice[mine])
+        main = _mostly(_some_of(mesh, order[ends[a] : ends[a + 1]]), _within(kind))
         result[a] = mean[a] if main is None else main
     return result
 
 
-def is_flat(corners: Array) -> bool:
-    """Whether most of a region, given by the corners of its triangles (F, 3, 3), is exactly level with itself."""
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    twice = np.sqrt(np.einsum("ij,ij->i", cross, cross))
-    return _mostly(cross / np.maximum(twice, 1e-300)[:, None], twice, LEVEL) is not None
+def is_flat(mesh: Mesh, faces: NDArray[np.int64]) -> bool:
+    """Whether most of a region, given by its faces, is exactly level with itself."""
+    return _mostly(_some_of(mesh, faces), LEVEL) is not None
 
 
 def flat_face(kind: str, normals: Array, weight: Array) -> Array | None:
@@ -82,17 +77,52 @@ def flat_face(kind: str, normals: Array, weight: Array) -> Array | None:
 
     It is the geometric median of the triangles' normals: what is bent at the edge of a flat face doesn't move it.
     """
-    return _mostly(normals, weight, EXACTLY if kind in ROUND else NEAR_FLAT)
+    return _mostly(lambda few: _every(normals, weight, few) if few else (normals, weight), _within(kind))
 
 
-def _mostly(normals: Array, weight: Array, within: float) -> Array | None:
-    """Median of the normals where most of them are within an angle of it."""
+def _within(kind: str) -> float:
+    return EXACTLY if kind in ROUND else NEAR_FLAT
+
+
+def _every(normals: Array, weight: Array, few: int) -> tuple[Array, Array]:
+    step = -(-len(weight) // few)
+    return normals[::step], weight[::step]
+
+
+def _some_of(mesh: Mesh, faces: NDArray[np.int64]) -> Callable[[int], tuple[Array, Array]]:
+    """Tells normals and weights of about so many of the faces, of all for 0."""
+    return lambda few: _normals_of(mesh.vertices, mesh.faces, faces[:: -(-len(faces) // few)] if few else faces)
+
+
+@kernel
+def _normals_of(vertices, faces, chosen):  # pragma: no cover - compiled
+    """Unit normals and areas, twice, of chosen faces."""
+    normals, twice = np.zeros((len(chosen), 3)), np.empty(len(chosen))
+    for i in range(len(chosen)):
+        a, b, c = vertices[faces[chosen[i], 0]], vertices[faces[chosen[i], 1]], vertices[faces[chosen[i], 2]]
+        x, y, z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+        u, v, w = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+        p, q, r = y * w - z * v, z * u - x * w, x * v - y * u
+        twice[i] = np.sqrt(p * p + q * q + r * r)
+        size = max(twice[i], 1e-300)
+        normals[i, 0], normals[i, 1], normals[i, 2] = p / size, q / size, r / size
+    return normals, twice
+
+
+def _mostly(told: Callable[[int], tuple[Array, Array]], within: float) -> Array | None:
+    """Median of the normals where most of them are within an angle of it; a few are looked at first, as most regions bend.
+
+    Args:
+        told: Normals and weights of about so many triangles, of all for 0.
+        within: The angle, rad.
+    """
     limit = np.cos(within)
-    step = -(-len(normals) // FEW)
-    few = _median(normals[::step], weight[::step])  # enough to see that a region bends
-    if few is None or weight[::step][normals[::step] @ few > limit].sum() < SURELY * weight[::step].sum():
+    normals, weight = told(FEW)  # enough to see that a region bends
+    few = _median(normals, weight)
+    if few is None or weight[normals @ few > limit].sum() < SURELY * weight.sum():
         return None
-    median = _median(normals, weight) if step > 1 else few
+    normals, weight = told(0)
+    median = _median(normals, weight)
     return None if median is None or weight[normals @ median > limit].sum() < MOSTLY * weight.sum() else median
 
 
