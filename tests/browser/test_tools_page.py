@@ -1,10 +1,12 @@
 """What an engineer does on the tools page: a file dropped, cut, corrected in the 3D view, and everything taken back after a reload."""
 
 import base64
+import io
 
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 from playwright.sync_api import Page, expect
 
 from app.geometry.moulds import sample_moulds
@@ -165,6 +167,14 @@ def test_edits_by_table_and_keyboard(desk: Studio) -> None:
     wait_for_count(desk, row["id"], count + 3)
 
     page.locator("tr[data-region='1']").click()
+    facts = page.locator(".region-facts")
+    known = desk.api.get(f"/tools/{row['id']}/regions")["items"][1]
+    expect(facts).to_contain_text(f"{known['kind']}")
+    expect(facts).to_contain_text(" cm, 0 cm free; touches " if known["free_border_mm"] == 0 else " cm free; touches ")
+    expect(facts).to_contain_text("°")  # the angle to a neighbour came
+    page.locator("tr[data-region='0']").click(modifiers=["Shift"])
+    expect(facts).to_contain_text(" cm apart")
+    page.locator("tr[data-region='1']").click()
     page.keyboard.press("Shift+L")
     page.get_by_role("button", name="Unlock B", exact=True).wait_for()
     page.keyboard.press("Shift+G")
@@ -193,6 +203,31 @@ def test_edits_by_table_and_keyboard(desk: Studio) -> None:
     lines = download.value.path().read_text(encoding="utf-8").splitlines()
     assert "area_mm2" in lines[0]
     assert len(lines) == 1 + count + 3
+
+
+def test_a_row_pointed_at_is_outlined_in_the_view(desk: Studio) -> None:
+    """And no longer when the pointer leaves the table."""
+    page = desk.page
+    _, pixels = editing(desk, "Trough 06")
+    low, high = pixels.min(axis=0), pixels.max(axis=0)
+    around = {"x": low[0], "y": low[1], "width": high[0] - low[0], "height": high[1] - low[1]}
+
+    def picture() -> np.ndarray:
+        return np.array(Image.open(io.BytesIO(page.screenshot(clip=around))).convert("RGB")).astype(int)
+
+    def wait_until(outlined: bool) -> None:
+        for _ in range(120):
+            changed = int((np.abs(picture() - before).max(axis=2) > 40).sum())
+            if changed > 50 if outlined else changed < 5:
+                return
+            page.wait_for_timeout(250)
+        raise AssertionError(f"{changed} pixels differ")
+
+    before = picture()
+    page.locator("tr[data-region='4']").hover()
+    wait_until(outlined=True)
+    page.locator(".region-facts").hover()
+    wait_until(outlined=False)
 
 
 def test_a_demonstration_on_an_older_cut_says_so(desk: Studio) -> None:
