@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 from PIL import Image
-from playwright.sync_api import Page, expect
+from playwright.sync_api import FloatRect, Page, expect
 
 from app.geometry.moulds import sample_moulds
 from tests.browser.canvas import Studio, sample_tool
@@ -210,12 +210,13 @@ def test_a_row_pointed_at_is_outlined_in_the_view(desk: Studio) -> None:
     page = desk.page
     _, pixels = editing(desk, "Trough 06")
     low, high = pixels.min(axis=0), pixels.max(axis=0)
-    around = {"x": low[0], "y": low[1], "width": high[0] - low[0], "height": high[1] - low[1]}
+    around = FloatRect(x=low[0], y=low[1], width=high[0] - low[0], height=high[1] - low[1])
 
     def picture() -> np.ndarray:
         return np.array(Image.open(io.BytesIO(page.screenshot(clip=around))).convert("RGB")).astype(int)
 
     def wait_until(outlined: bool) -> None:
+        changed = 0
         for _ in range(120):
             changed = int((np.abs(picture() - before).max(axis=2) > 40).sum())
             if changed > 50 if outlined else changed < 5:
