@@ -1,6 +1,7 @@
 """create_app(): the one place that wires the parts together."""
 
 import asyncio
+import gc
 import weakref
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -78,6 +79,7 @@ def create_app(settings: Settings) -> FastAPI:
         loop = asyncio.get_running_loop()
         app.state.streams = events.Streams(context.store, loop)
         hub.start(loop)
+        gc.freeze()  # what is loaded by now stays: looking for garbage among it would hold up somebody's request
         try:
             yield
         finally:

@@ -45,7 +45,9 @@ def find_attributes(mesh: Mesh, labels: NDArray[np.int32], shapes: Sequence[Shap
     # a region that closes on itself (a ring wall) has no mean normal; call it upright
     normal = np.where((size > 1e-6 * area)[:, None], normal / np.maximum(size, 1e-300)[:, None], [0.0, 0.0, 1.0])
     low, high = region_boxes(mesh.vertices, mesh.faces, labels, n)
-    bends = [shape or region_shape(mesh, np.flatnonzero(labels == a)) for a, shape in enumerate(shapes or [None] * n)]
+    known, order = shapes or [None] * n, np.argsort(labels, kind="stable")
+    ends = np.searchsorted(labels[order], np.arange(n + 1))
+    bends = [known[a] or _shape(mesh, order[ends[a] : ends[a + 1]], low[a], high[a]) for a in range(n)]
     curvature, kind = np.array([b for b, _ in bends]), tuple(k for _, k in bends)
     return Attributes(area, projected, centroid, normal, curvature, kind, low, high)
 
@@ -78,11 +80,16 @@ def region_boxes(vertices, faces, labels, n):  # pragma: no cover - compiled
     """Lower and upper corner (n, 3) of the box of each region; faces with label -1 belong to none."""
     low, high = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)
     for f in range(len(faces)):
-        if labels[f] >= 0:
-            for v in faces[f]:
-                for c in range(3):
-                    low[labels[f], c] = min(low[labels[f], c], vertices[v, c])
-                    high[labels[f], c] = max(high[labels[f], c], vertices[v, c])
+        region = labels[f]
+        if region < 0:
+            continue
+        for k in range(3):
+            for c in range(3):
+                at = vertices[faces[f, k], c]
+                if at < low[region, c]:
+                    low[region, c] = at
+                if at > high[region, c]:
+                    high[region, c] = at
     return low, high
 
 
@@ -98,23 +105,29 @@ def _nearest_middles(vertices, faces, labels, wanted):  # pragma: no cover - com
         region = labels[f]
         if region < 0:
             continue
-        middle = (vertices[faces[f, 0]] + vertices[faces[f, 1]] + vertices[faces[f, 2]]) / 3
-        x, y, z = middle - wanted[region]
-        distance = x * x + y * y + z * z
+        distance = 0.0
+        for c in range(3):
+            middle = (vertices[faces[f, 0], c] + vertices[faces[f, 1], c] + vertices[faces[f, 2], c]) / 3
+            distance += (middle - wanted[region, c]) ** 2
         if distance < nearest[region]:
             nearest[region] = distance
-            points[region] = middle
+            points[region] = (vertices[faces[f, 0]] + vertices[faces[f, 1]] + vertices[faces[f, 2]]) / 3
     return points
 
 
-def region_shape(mesh: Mesh, faces: NDArray[np.int64]) -> tuple[float, str]:
+def region_shape(mesh: Mesh, faces: NDArray[np.int64]) -> Shape:
     """Signed dominant curvature (1/m) and kind of one region.
 
     Paper: curvature comes from the fitted primitive, 1/r (of a cone: at its mean square distance to the axis); where none fits,
     from how the normals turn over the region. A flat face stays one with its holes and fillets.
     """
+    low, high = region_boxes(mesh.vertices, mesh.faces[faces], np.zeros(len(faces), np.int32), 1)
+    return _shape(mesh, faces, low[0], high[0])
+
+
+def _shape(mesh: Mesh, faces: NDArray[np.int64], low: Array, high: Array) -> Shape:
+    """The same where the corners of the region's box are known."""
     chosen = mesh.faces[faces]
-    low, high = (box[0] for box in region_boxes(mesh.vertices, chosen, np.zeros(len(chosen), np.int32), 1))
     scale = float(np.linalg.norm(high - low))
     sums = sums_about(mesh.vertices, chosen, (low + high) / 2, scale)
     kind, curvature = _primitive(sums)

@@ -18,6 +18,7 @@ Integers = NDArray[np.int64]
 
 WELD = 1e-6  # share of the diagonal within which two vertices are one
 FLAT = 1e-12  # share of the squared diagonal below which a triangle has no area
+FEW = 64  # sides in a bucket up to which they are sorted by insertion
 
 
 @dataclass(frozen=True)
@@ -142,10 +143,18 @@ def _edges_of(faces, n):  # pragma: no cover - compiled
         first, last = start[low], start[low + 1]
         if last == first:
             continue
-        order = np.argsort(other[first:last], kind="mergesort")
-        for at in range(last - first):
-            here = first + order[at]
-            if at == 0 or other[here] != edges[edge, 1]:
+        if last - first > FEW:
+            order = np.argsort(other[first:last], kind="mergesort")
+            other[first:last], side[first:last] = other[first:last][order], side[first:last][order]
+        else:
+            for at in range(first + 1, last):
+                high, its, to = other[at], side[at], at
+                while to > first and other[to - 1] > high:
+                    other[to], side[to] = other[to - 1], side[to - 1]
+                    to -= 1
+                other[to], side[to] = high, its
+        for here in range(first, last):
+            if here == first or other[here] != edges[edge, 1]:
                 edge += 1
                 edges[edge, 0], edges[edge, 1] = low, other[here]
             side_edge[side[here] // 3, side[here] % 3] = edge

@@ -16,7 +16,10 @@ from app.geometry.tool import Array
 
 _QUADRATIC = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (2, 0, 0), (0, 2, 0), (0, 0, 2), (1, 1, 0), (1, 0, 1), (0, 1, 1))
 _MONOMIALS = sorted({tuple(a + b for a, b in zip(p, q, strict=True)) for p in _QUADRATIC for q in _QUADRATIC}, key=lambda e: (sum(e), e))
-EXPONENT = np.array(_MONOMIALS)
+_FACTOR = np.array([next((c for c in range(3) if m[c]), 0) for m in _MONOMIALS])  # a coordinate that divides each monomial
+_REST = np.array(
+    [_MONOMIALS.index((*m[:c], m[c] - 1, *m[c + 1 :])) if any(m) else 0 for m, c in zip(_MONOMIALS, _FACTOR, strict=True)]
+)  # what is left
 PRODUCT = np.array([[_MONOMIALS.index(tuple(a + b for a, b in zip(p, q, strict=True))) for q in _QUADRATIC] for p in _QUADRATIC])
 SQUARE = np.array([[4, 7, 8], [7, 5, 9], [8, 9, 6]])  # position in q of x_a x_b
 NORMAL, NORMAL2, NORMAL_CENTRE, AREA, SIZE = 35, 38, 44, 53, 54
@@ -40,31 +43,31 @@ def sums_about(vertices: Array, faces: NDArray[np.integer], middle: Array, scale
 
 @kernel
 def _sums_of(vertices, faces):  # pragma: no cover - compiled
-    sums, corners, power = np.zeros((len(faces), SIZE)), np.empty((3, 3)), np.ones((3, 5))
+    sums, corners, value = np.zeros((len(faces), SIZE)), np.empty((3, 3)), np.empty(NORMAL)
     for f in range(len(faces)):
         for k in range(3):
             corners[k] = vertices[faces[f, k]]
-        _fill_sums(corners, power, sums[f])
+        _fill_sums(corners, value, sums[f])
     return sums
 
 
 @kernel
 def _sum_about(vertices, faces, middle, scale):  # pragma: no cover - compiled
-    total, one, corners, power = np.zeros(SIZE), np.empty(SIZE), np.empty((3, 3)), np.ones((3, 5))
+    total, one, corners, value = np.zeros(SIZE), np.empty(SIZE), np.empty((3, 3)), np.empty(NORMAL)
     for f in range(len(faces)):
         for k in range(3):
             for c in range(3):
                 corners[k, c] = (vertices[faces[f, k], c] - middle[c]) / scale
         one[:] = 0
-        _fill_sums(corners, power, one)
+        _fill_sums(corners, value, one)
         for at in range(SIZE):
             total[at] += one[at]
     return total
 
 
 @kernel
-def _fill_sums(corners, power, m):  # pragma: no cover - compiled
-    """The 54 numbers of one face into m, which is all zero; power (3, 5) is scratch with ones first."""
+def _fill_sums(corners, value, m):  # pragma: no cover - compiled
+    """The 54 numbers of one face into m, which is all zero; value (35,) is scratch."""
     a, b, g = corners[0], corners[1], corners[2]
     twice = 0.0
     for c in range(3):
@@ -74,11 +77,11 @@ def _fill_sums(corners, power, m):  # pragma: no cover - compiled
     area = np.sqrt(twice) / 2
     m[AREA] = area
     for v in corners:
-        for c in range(3):
-            for degree in range(1, 5):
-                power[c, degree] = power[c, degree - 1] * v[c]
-        for at in range(NORMAL):
-            m[at] += area / 3 * power[0, EXPONENT[at, 0]] * power[1, EXPONENT[at, 1]] * power[2, EXPONENT[at, 2]]
+        value[0] = area / 3
+        m[0] += value[0]
+        for at in range(1, NORMAL):  # by degree, so that the rest is known
+            value[at] = value[_REST[at]] * v[_FACTOR[at]]
+            m[at] += value[at]
     for c in range(3):
         m[NORMAL + c] /= 2  # area times unit normal
         for d in range(3):

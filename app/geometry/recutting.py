@@ -137,16 +137,19 @@ def _without_scraps(part: ImportedPart, labels: np.ndarray, locked: int) -> np.n
     owner = np.full(int(piece.max()) + 1, -1, np.int64)
     owner[piece] = labels
     least = SCRAP * area[labels >= 0].sum()
-    length = shared_length(part.mesh.vertices, part.mesh.faces, pairs)
+    between = pairs[piece[pairs[:, 0]] != piece[pairs[:, 1]]]
+    length = shared_length(part.mesh.vertices, part.mesh.faces, between)
+    into, size, both = np.arange(len(owner)), np.bincount(piece, weights=area), piece[between]
     while True:
-        size = np.bincount(piece, weights=area, minlength=len(owner))
         small = [p for p in np.argsort(size).tolist() if 0 < size[p] < least and owner[p] >= locked]
         for scrap in small:
-            both = piece[pairs]
-            beyond = both.sum(axis=1) - scrap
-            near = ((both == scrap).sum(axis=1) == 1) & (owner[np.clip(beyond, 0, len(owner) - 1)] >= locked)
+            a, b = both.T
+            beyond = np.where(a == scrap, b, a)
+            near = ((a == scrap) != (b == scrap)) & (owner[beyond] >= locked)
             if near.any():
-                piece = np.where(piece == scrap, int(np.argmax(np.bincount(beyond[near], weights=length[near]))), piece)
+                onto = int(np.argmax(np.bincount(beyond[near], weights=length[near])))
+                into[into == scrap], size[onto], size[scrap] = onto, size[onto] + size[scrap], 0
+                both = np.where(both == scrap, onto, both)
                 break
         else:
-            return np.where(owner[piece] >= locked, locked + piece, owner[piece])
+            return np.where(owner[into] >= locked, locked + into, owner[into])[piece]

@@ -30,8 +30,13 @@ class Round:
         away = points - self.point
         if self.kind != "sphere":
             away = away - (away @ self.axis)[:, None] * self.axis
-        away = away / np.maximum(np.linalg.norm(away, axis=1), 1e-300)[:, None]
+        away = away / np.maximum(_sizes(away), 1e-300)[:, None]
         return self.outward * (away - self.slope * self.axis) / np.hypot(1.0, self.slope)
+
+
+def _sizes(vectors: Array) -> Array:
+    """Length of each row; several times as quick as numpy's norm over so short an axis."""
+    return np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
 
 
 def used_vertices(mesh: Mesh, faces: NDArray[np.int32]) -> NDArray[np.int64]:
@@ -48,22 +53,22 @@ def fit_round(kind: str, mesh: Mesh, faces: NDArray[np.int32]) -> Round | None:
     x = points - middle
     size = diagonal(x)
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    twice = np.linalg.norm(cross, axis=1)
+    twice = _sizes(cross)
     if kind == "sphere":
         axis, centre = np.array([0.0, 0.0, 1.0]), _centre(x)
-        slope, radius = 0.0, float(np.linalg.norm(x - centre, axis=1).mean())
+        slope, radius = 0.0, float(_sizes(x - centre).mean())
     else:
         axis = _axis(kind, cross / np.maximum(twice, 1e-300)[:, None], twice)
         frame, height = tangent_frame(axis), x @ axis
         flat = x @ frame.T
         round_flat = _centre(flat, *([height, height**2] if kind == "cone" else []))
-        distance = np.linalg.norm(flat - round_flat, axis=1)
+        distance = _sizes(flat - round_flat)
         slope, radius = (float(v) for v in np.polyfit(height, distance, 1)) if kind == "cone" else (0.0, float(distance.mean()))
         centre = round_flat @ frame
     if not 0 < radius < LARGEST * size:
         return None
     shape = Round(kind, middle + centre, axis, slope, radius, 1.0)
-    looks = float((shape.normals(corners.mean(axis=1)) * cross).sum())
+    looks = float(np.vdot(shape.normals((corners[:, 0] + corners[:, 1] + corners[:, 2]) / 3), cross))
     return Round(kind, middle + centre, axis, slope, radius, 1.0 if looks >= 0 else -1.0)
 
 
@@ -89,7 +94,7 @@ def unroll(shape: Round, corners: Array) -> tuple[Array, Array]:
     frame = tangent_frame(shape.axis)
     x = corners - shape.point
     height, flat = x @ shape.axis, x @ frame.T
-    distance = np.linalg.norm(flat, axis=2)
+    distance = np.hypot(flat[..., 0], flat[..., 1])
     angle = np.arctan2(flat[..., 1], flat[..., 0])
     # the tip of a cone lies at any angle: at that of the next corner
     angle = np.where(distance < 1e-6 * distance.max(), np.roll(angle, -1, axis=1), angle)

@@ -179,13 +179,18 @@ def _weighted(vertices, faces):  # pragma: no cover - compiled
     for turn in range(2):
         for f in range(len(faces)):
             a, b, c = vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]]
-            u, v = b - a, c - a
-            area = np.sqrt((u[1] * v[2] - u[2] * v[1]) ** 2 + (u[2] * v[0] - u[0] * v[2]) ** 2 + (u[0] * v[1] - u[1] * v[0]) ** 2) / 2
+            twice = 0.0
+            for k in range(3):
+                i, j = (k + 1) % 3, (k + 2) % 3
+                twice += ((b[i] - a[i]) * (c[j] - a[j]) - (b[j] - a[j]) * (c[i] - a[i])) ** 2
+            area = np.sqrt(twice) / 2
+            for k in range(3):
+                if turn == 0:
+                    middle[k] += area * (a[k] + b[k] + c[k]) / 3
+                else:
+                    square += area * ((a[k] - middle[k]) ** 2 + (b[k] - middle[k]) ** 2 + (c[k] - middle[k]) ** 2) / 3
             if turn == 0:
                 total += area
-                middle += area * (a + b + c) / 3
-            else:
-                square += area * (np.sum((a - middle) ** 2) + np.sum((b - middle) ** 2) + np.sum((c - middle) ** 2)) / 3
         if turn == 0:
             middle /= total
     return middle, square / total

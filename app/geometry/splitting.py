@@ -235,12 +235,18 @@ def quantiles(corners: Array, area: Array, fractions: Array) -> Array:
 
 @kernel
 def _area_before(corners, area, grid):  # pragma: no cover - compiled
-    """Area of triangles with corner positions (F, 3) before each place of the grid."""
+    """Area of triangles with corner positions (F, 3) before each place of the grid, which is even."""
     before, whole = np.zeros(len(grid)), np.zeros(len(grid) + 1)
+    steps = (len(grid) - 1) / max(grid[-1] - grid[0], 1e-300)
     for f in range(len(area)):
-        first, last = min(corners[f]), max(corners[f])
-        middle = corners[f, 0] + corners[f, 1] + corners[f, 2] - first - last
-        k = np.searchsorted(grid, first)
+        u, v, w = corners[f]
+        first, last = min(u, v, w), max(u, v, w)
+        middle = u + v + w - first - last
+        k = min(max(int((first - grid[0]) * steps), 0), len(grid) - 1)
+        while k > 0 and grid[k - 1] >= first:
+            k -= 1
+        while k < len(grid) and grid[k] < first:
+            k += 1
         while k < len(grid) and grid[k] < last:
             x = grid[k]
             if x <= middle and middle > first:
@@ -292,15 +298,16 @@ def _gather(surface: Surface, region: int, cells: Integers, parts: int, free: in
     pairs = face_pairs(faces)
     piece = connected(cells, pairs)
     area = areas(surface.vertices, faces)
-    length = shared_length(surface.vertices, faces, pairs)
+    between = pairs[piece[pairs[:, 0]] != piece[pairs[:, 1]]]
+    length = shared_length(surface.vertices, faces, between)
     while True:
         size = np.bincount(piece, weights=area)
         least = int(np.argmin(size))
         if len(size) == 1 or (len(size) <= parts and size[least] >= SCRAP * area.sum() / parts):
             break
-        both = piece[pairs]
-        touching = (both == least).sum(axis=1) == 1
-        border = np.bincount(both[touching].sum(axis=1) - least, weights=length[touching], minlength=len(size))
+        a, b = piece[between].T
+        touching = (a == least) != (b == least)
+        border = np.bincount(np.where(a == least, b, a)[touching], weights=length[touching], minlength=len(size))
         piece = np.where(piece == least, int(np.argmax(border)), piece)
         piece -= piece > least
     labels = surface.labels.copy()

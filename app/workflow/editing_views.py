@@ -1,5 +1,7 @@
 """Views in which regions are edited: what is selected, the points clicked, and how both follow the edits."""
 
+import gc
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -140,11 +142,19 @@ def get_ready(ctx: Context, tool_id: str) -> None:
     tool, names = ctx.store.read(query)
     if tool.graph.source == "mesh":
         warm_up()
+        _settle()
         ctx.values.tree(tool, *names)
         _, part_sha, tree_sha = names
         part, tree = ctx.values.part(part_sha), ctx.values.part_tree(tree_sha)
         if part_sha is not None and part is not None and tree is not None:
             ctx.values.patches(part_sha, part, tree, SegmentationParameters())
+
+
+@cache
+def _settle() -> None:
+    """Look for garbage once and never again among all that is loaded by now: a look takes a fifth of a second of somebody's edit."""
+    gc.collect()
+    gc.freeze()
 
 
 def cad_colours(ctx: Context, tool_id: str) -> tuple[Colour | None, ...]:
