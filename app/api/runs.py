@@ -3,7 +3,7 @@
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, File, Query, Response, UploadFile
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from app.api.dependencies import Body, Ctx, Json, Name, Paging, Row, Seed, located, page
 from app.api.idempotency import ActionRoute, IdempotencyKey
@@ -15,7 +15,15 @@ router = APIRouter(tags=["runs"], route_class=ActionRoute)
 Kind = Literal["performance", "effort"]
 Mode = Literal["certified", "paper"]
 ParameterName = Annotated[str, Field(max_length=60)]
-ParameterValue = bool | int | float
+
+
+def _number_or_switch(value: object) -> object:
+    if not isinstance(value, bool | int | float):
+        raise ValueError("it should be a number, or true or false")
+    return value
+
+
+ParameterValue = Annotated[bool | int | float, BeforeValidator(_number_or_switch)]
 
 
 class NewRun(Body):

@@ -9,6 +9,7 @@ import trimesh
 
 from app.benches.composites import Composite
 from app.benches.figures import Figure
+from app.geometry.creases import creased
 from app.settings import Settings
 from app.viewer.borders import find_lines, part_of
 from app.viewer.palette import tint_choice
@@ -63,8 +64,9 @@ def _answer(ctx: Context, tool_id: str, regions: int, *, continues: bool = False
     segmentations.list_regions(ctx, tool_id)
     tool = tools.tool_value(ctx, tool_id)
     find_lines(tool, 1e-3)
+    sharp = creased(tool.mesh, tool.labels)
     for region in range(-1, tool.n):
-        part_of(tool.mesh, tool.mesh.faces[tool.labels == region])
+        part_of(sharp, sharp.faces[tool.labels == region])
     label_points(tool)
     tint_choice(tool.graph.neighbour)
 

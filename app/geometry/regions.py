@@ -9,6 +9,7 @@ from app.errors import InvalidInput
 from app.geometry.attributes import Attributes, Shape, find_attributes, nearest_middles, region_boxes
 from app.geometry.borders import corner_neighbours, find_borders, opposite_lengths
 from app.geometry.cleaning import face_pairs
+from app.geometry.creases import creased
 from app.geometry.descriptions import describe
 from app.geometry.distances import surface_distances
 from app.geometry.exact_shapes import CadSurfaces, exact_shapes
@@ -154,4 +155,5 @@ def warm_up() -> None:
     split_large(Surface(vertices, faces, np.full(2, -1, np.int32), np.zeros(2, np.int64), np.arange(2)), 2, 2)
     tool = measure(Mesh(vertices, faces.astype(np.int32)), np.zeros(2, np.int32))
     nearest_middles(tool.mesh, tool.labels, vertices[:1])
+    creased(tool.mesh, tool.labels)
     surface_distances(Mesh(vertices, faces.astype(np.int32)), np.zeros(2, np.int32), vertices[:1])

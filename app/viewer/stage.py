@@ -9,6 +9,7 @@ import viser
 from numpy.typing import NDArray
 from viser import _messages  # private, guarded by tests/viewer/test_viser.py
 
+from app.geometry.creases import creased
 from app.geometry.tool import Array, Tool
 from app.viewer.borders import find_lines, part_of, size
 from app.viewer.palette import Rgb, Theme, linear, rgb, theme
@@ -137,8 +138,9 @@ class Stage:
         if len(rest):
             body = self._add_mesh("/tool/body", *part_of(tool.mesh, rest), rgb(colours.body), flat_shading=True)
             self._listen(body, None)
+        sharp = creased(tool.mesh, tool.labels)
         for region in range(tool.n):
-            vertices, faces = part_of(tool.mesh, tool.mesh.faces[tool.labels == region])
+            vertices, faces = part_of(sharp, sharp.faces[tool.labels == region])
             mesh = self._add_mesh(f"/tool/r{region:03d}", vertices, faces, rgb(colours.body))
             self._listen(mesh, region)
             self._regions.append(mesh)

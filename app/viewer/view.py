@@ -287,8 +287,7 @@ class View:
             if away:
                 middle = tool.mesh.vertices.mean(0)
                 self.stage.place_camera(camera_for(tool, room_needed(playback, middle) if playback is not None else None))
-        self._tool, self._playback, self._dark = tool, playback, dark
-        self._playback_shown = playback_id
+        self._tool, self._playback, self._playback_shown, self._dark = tool, playback, playback_id, dark
         self._pointer.listen(mode == "edit")
         if mode == "edit":
             self._get_ready(self._scene["tool_id"])

@@ -183,6 +183,8 @@ def check_effort_options(api: Api, project: str) -> None:
     """Start and end always count; long ways and changes of side are switched on, with true or false."""
     offered = api.get(f"/projects/{project}/run-defaults", params={"kind": "effort"})["parameters"]
     assert [(p["value"], p["default"]) for p in offered if p["key"] in EFFORT_OPTIONS] == [(False, False)] * 2
+    told = api.post(f"/projects/{project}/runs", {"kind": "effort", "params": {"travel": "yes"}}, status=422)["detail"]
+    assert told == "params.travel can't be used: it should be a number, or true or false."
     told = api.post(f"/projects/{project}/runs", {"kind": "effort", "params": {"travel": 3}}, status=422)["detail"]
     assert "true or false" in told
     told = api.post(f"/projects/{project}/runs", {"kind": "effort", "params": {"distance": True}}, status=422)["detail"]

@@ -35,7 +35,7 @@ export class Doubt {
   }
 
   button(words, tip, act) {
-    const node = h("button.btn.small", { type: "button", dataset: { tip }, onclick: async () => {
+    const node = h("button.btn.quiet", { type: "button", dataset: { tip }, onclick: async () => {
       node.disabled = true;
       try {
         await act();

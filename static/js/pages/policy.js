@@ -154,8 +154,9 @@ function paintHead() {
   const { tool, plan, policy } = state;
   const learned = `Learned from ${plural(policy.learned_from.demonstrations, "demonstration")} and ${plural(policy.learned_from.answers, "answer")}.`;
   fill(parts.head, h("div.title", {}, h("h1", {}, `The order for ${tool.name}`), h("p", {}, `${plan.demonstrated ? "You have demonstrated this tool." : "Nobody has demonstrated this tool."} ${learned}`)),
-    h("button.btn.quiet", { type: "button", style: { "margin-left": "auto" }, dataset: { key: "weights" }, onclick: () => certificate.open() }, icon("table"), "What it learned"),
-    h("button.btn.quiet", { type: "button", dataset: { key: "export", tip: "The order, its cost and its explanation as JSON" }, onclick: save }, icon("download"), "Export"),
+    doubt.node,
+    h("button.icon-btn", { type: "button", "aria-label": "What it learned", dataset: { key: "weights", tip: "What it learned" }, onclick: () => certificate.open() }, icon("table")),
+    h("button.icon-btn", { type: "button", "aria-label": "Export", dataset: { key: "export", tip: "Export: the order, its cost and its explanation as JSON" }, onclick: save }, icon("download")),
     h("div.next", { style: { "margin-left": "0" } }, h("p", {}, h("span.kicker", {}, "Next: watch the robot"), "in simulation"), h("a.btn.primary", { href: pageAddress(shell.projectId, "robot", { plan: plan.id }) }, "Open on the robot")));
 }
 
@@ -257,7 +258,7 @@ async function build() {
   state.stepper = new Stepper({ n: 1, onStep: showOrder, name: "Play the order" });
   parts.stage.append(h("div.bl", {}, h("div.play", {}, state.stepper.node)));
   state.stepper.node.style.flex = "1";
-  fill(shell.main, parts.head, h("div.policy-upper", {}, parts.stage, h("aside.card.fill", {}, parts.proof, doubt.node, certificate.line, parts.facts, wishes.node, parts.whatif)),
+  fill(shell.main, parts.head, h("div.policy-upper", {}, parts.stage, h("aside.card.fill", {}, parts.proof, certificate.line, parts.facts, wishes.node, parts.whatif)),
     h("section.card.policy-lower", { "aria-label": "Why this order" }, h("div.bar-head", {}, h("h2.nowrap", {}, "Why this order"), h("span.small.muted.nowrap", {}, "cost per step"), parts.legend), parts.chart, parts.tiles, h("p.underline", {}, "Drag a region to another place, or use Alt with the arrows.")), certificate.node);
   state.view = new View3D(parts.stage, { projectId: shell.projectId, name: "policy" });
   state.view.onPicked((region) => wishes.pick(region));
