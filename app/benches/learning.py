@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from app.benches.calibration import calibration_figures
 from app.benches.effort_figures import effort_figures
 from app.benches.figures import Figure, Options
 from app.benches.noisy import noisy_figures
@@ -45,6 +46,7 @@ def measure(options: Options) -> Iterator[Figure]:
     yield from _real(options.data, options.quick)
     yield from _speed(synthetic)
     yield from effort_figures(synthetic)
+    yield from calibration_figures(synthetic, seeds)
     yield from noisy_figures(synthetic, QUICK_SEEDS if options.quick else ERRING)
 
 

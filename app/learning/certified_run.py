@@ -309,9 +309,9 @@ AGAIN = "Your answer to this question fits to none of the weights that explain t
 def _report(demonstrations: Demonstrations, proof: Certificate, outlooks: dict[int, Outlook], known: Known, repeats: Repeats) -> Report:
     count = len(demonstrations)
     chances = tuple(
-        ToolChance(t, 1.0, 0.0, True, 1)  # the expert's own word
+        ToolChance(t, 1.0, 0.0, True, 1, 0)  # the expert's own word
         if t in known.chosen
-        else ToolChance(t, round(o.probability, 6), round(o.worst, 9), o.agreed, len(o.orders))
+        else ToolChance(t, round(o.probability, 6), round(o.worst, 9), o.agreed, len(o.orders), len(o.favourite))
         for t, o in sorted(outlooks.items())
     )
     shares = proof.weights * proof.frame.scale

@@ -45,6 +45,7 @@ class ToolChance:
     extra: float  # largest relative extra cost under any weights that agree with what is known
     agreed: bool  # extra is at most the tolerance everywhere
     classes: int  # sequences that come into question
+    samples: int  # of the weights behind the probability; 0 where it is no estimate
 
 
 @dataclass(frozen=True)

@@ -63,4 +63,4 @@ def _chance(tool: int, problem: SequencingProblem, weights: Array, tolerance: fl
     extra = ((cost[0] - cost.min(axis=0)) / size)[1:]
     classes = len(np.unique(np.round(raw @ weights[0] / size[0], DIGITS)))
     worst = float(np.quantile(extra, CREDIBLE[1]))
-    return ToolChance(tool, round(float((extra <= EQUAL).mean()), 6), round(worst, 9), worst <= tolerance + EQUAL, classes)
+    return ToolChance(tool, round(float((extra <= EQUAL).mean()), 6), round(worst, 9), worst <= tolerance + EQUAL, classes, len(extra))

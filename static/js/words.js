@@ -42,3 +42,9 @@ export function bytes(count) {
   if (count < 1e6) return `${Math.max(1, Math.round(count / 1e3))} kB`;
   return `${number(count / 1e6)} MB`;
 }
+
+// How sure an order is: a share of samples. All of them is no certainty; the rule of succession says how near to it they are.
+export function sure({ probability, samples = 64 }) {
+  if (probability < 1) return `${probability > 0 && probability < 0.01 ? "under 1" : Math.min(99, Math.round(100 * probability))} %`;
+  return samples === 0 ? "100 %" : `over ${Math.floor(100 - 100 / (samples + 2))} %`;
+}

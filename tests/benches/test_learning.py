@@ -1,5 +1,7 @@
 """The learning bench on the authors' tables, smallest doses."""
 
+import itertools
+
 import numpy as np
 
 from app.benches.figures import Options
@@ -22,6 +24,10 @@ def test_figures_of_the_quick_bench():
     assert found["same seed and answers give the same bytes"] == 1
     assert figures["authors' real tools", "hits, no answers"].value == 1
     assert "missed: 1;" in figures["authors' real tools", "hits, no answers"].note
+    bins = [f for f in figures.values() if f.name.startswith("right where")]
+    assert len(bins) >= 5
+    assert all(a.value < b.value + 25 for a, b in itertools.pairwise(bins))  # surer is more often right; few experts
+    assert abs(next(f.value for f in figures.values() if f.name == "right less stated, all tools")) < 12
     assert figures["authors' real tools", "hits after at most 3 answers per tool"].value == 2
 
 

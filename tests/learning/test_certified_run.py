@@ -65,6 +65,7 @@ def test_stops_of_its_own_with_every_tool_right(demos, tools):
             chosen = shortest_sequence(tool, result.weights).sequence
             assert tool.cost(TRUE_WEIGHTS, chosen) <= (sums @ TRUE_WEIGHTS).min() * (1 + 1e-7)
             assert result.report.tools[t].probability == 1.0
+            assert result.report.tools[t].samples == 0  # no estimate
     assert len(shown) < len(tools) / 2 + 1
 
 

@@ -70,7 +70,7 @@ def test_sureness_of_likelihood(plain):
     assert sum(abs(x) for x in sure.shares) == pytest.approx(1.0)
     inside = [low <= share <= high for share, (low, high) in zip(sure.shares, sure.intervals, strict=True)]
     assert sum(inside) >= 0.8 * len(inside)
-    assert all(0 <= c.probability <= 1 and c.classes >= 1 and c.extra >= 0 for c in sure.tools)
+    assert all(0 <= c.probability <= 1 and c.classes >= 1 and c.extra >= 0 and c.samples > 1 for c in sure.tools)
     assert sureness(found, problems, 0.005) == sure
     tighter = replace(found, fit=replace(found.fit, curvatures=100 * found.fit.curvatures))
     width = [sum(b - a for a, b in s.intervals) for s in (sure, sureness(tighter, problems, 0.005))]

@@ -5,7 +5,7 @@ import { fill, h } from "../dom.js";
 import { icon } from "../icons.js";
 import { pageAddress } from "../shell.js";
 import { drawTool } from "../thumbnail.js";
-import { number, plural } from "../words.js";
+import { number, plural, sure } from "../words.js";
 import { settled } from "./teach-start.js";
 
 const NOTHING = 1e-7; // relative extra cost that is none
@@ -48,7 +48,7 @@ export class Certificate {
   ofTool(tool) {
     const { certificate } = this.policy;
     const chance = certificate?.tools?.find((entry) => entry.tool_id === tool.id);
-    if (chance) return `Sure of this order: ${percent(chance.probability)}`;
+    if (chance) return `Sure of this order: ${sure(chance)}`;
     const shown = certificate?.demonstrations?.find((entry) => entry.tool_id === tool.id);
     if (shown) return shown.slack > NOTHING ? `Your order of ${tool.name} costs ${dearer(shown.slack)} more than the cheapest` : `Your order of ${tool.name} is among the cheapest`;
     return certificate ? "How sure this order is: known after learning again" : "What that means";
@@ -97,7 +97,7 @@ export class Certificate {
   chances(certificate) {
     const tools = certificate.tools ?? [];
     if (!tools.length) return null;
-    const row = (entry) => h("tr", {}, h("td", {}, this.name(entry)), h("td.num", {}, percent(entry.probability)), h("td.num", {}, dearer(entry.extra)), h("td.small", {}, entry.agreed ? settled(entry) : h("a", { href: pageAddress(this.projectId, "record", { tool: entry.tool_id }) }, "record it")));
+    const row = (entry) => h("tr", {}, h("td", {}, this.name(entry)), h("td.num", {}, sure(entry)), h("td.num", {}, dearer(entry.extra)), h("td.small", {}, entry.agreed ? settled(entry) : h("a", { href: pageAddress(this.projectId, "record", { tool: entry.tool_id }) }, "record it")));
     return h("section", {}, h("h3", {}, "Tools nobody has recorded"), h("p.small.muted", {}, `Expect ${number(certificate.expected_wrong, 2)} of ${tools.length} to have a better order than the one chosen.`),
       h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, "Tool"), h("th.num", { dataset: { tip: "Share of the weights that agree with all you said under which the chosen order is among the cheapest" } }, "Order is right"), h("th.num", { dataset: { tip: certificate.kind === "likelihood" ? "How much more the chosen order costs than the best one, under 95 % of these weights" : "How much more the chosen order could cost than the best one, under any of these weights" } }, "At worst dearer by"), h("th", {}, ""))), h("tbody", {}, tools.map(row))));
   }

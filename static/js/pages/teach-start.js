@@ -6,7 +6,7 @@ import { fill, h } from "../dom.js";
 import { icon } from "../icons.js";
 import { pageAddress } from "../shell.js";
 import { complain } from "../toasts.js";
-import { ago, number, plural } from "../words.js";
+import { ago, number, plural, sure } from "../words.js";
 import { readExperts } from "./teach-experts.js";
 
 function parameterField(entry) {
@@ -126,13 +126,11 @@ export function settled({ extra }) {
   return extra < 1e-7 ? "settled" : h("span", { dataset: { tip: `Another order may be better, by ${number(100 * extra, 2)} % of the cost at most: too little to ask about` } }, "good enough");
 }
 
-const percent = (share) => `${Math.round(100 * share)} %`;
-
 // How sure the choice is on each tool nobody has recorded, and on which demonstrations the weights fall short.
 function chances(report, project) {
   if (!report) return null;
   const odd = report.demonstrations.filter((entry) => entry.slack > 1e-7);
-  const row = (tool) => h("tr", {}, h("td", {}, tool.tool_name), h("td.num", { dataset: { tip: "Share of the weights that agree with all you said under which the chosen order is among the cheapest" } }, percent(tool.probability)),
+  const row = (tool) => h("tr", {}, h("td", {}, tool.tool_name), h("td.num", { dataset: { tip: "Share of the weights that agree with all you said under which the chosen order is among the cheapest" } }, sure(tool)),
     h("td.num", { dataset: { tip: "How much more the chosen order could cost than the best one, under any of these weights" } }, tool.extra < 1e-7 ? "nothing" : `${number(100 * tool.extra, 2)} %`),
     h("td", {}, tool.agreed ? settled(tool) : h("a", { href: pageAddress(project.id, "record", { tool: tool.tool_id }) }, "record it")));
   const exclude = (report.conflicts ?? []).map((conflict) => h("li", {}, conflict.tools.map((entry, i) => [i ? ", " : "", h("a", { href: pageAddress(project.id, "record", { tool: entry.tool_id }) }, entry.tool_name), h("span.muted", { dataset: { tip: "How much dearer its order is when the others are explained" } }, ` (${number(100 * entry.slack, 2)} %)`)]), ` exclude each other; without any one of them the rest fits. ${conflict.resolved}`));
