@@ -163,6 +163,11 @@ def test_edits_by_table_and_keyboard(desk: Studio) -> None:
     page.keyboard.press("Shift+G")
     page.get_by_role("spinbutton", name="Number of columns").fill("2")
     page.get_by_role("spinbutton", name="Number of columns").press("Tab")
+    page.get_by_role("spinbutton", name="Width of a cell in cm").fill("9")
+    page.get_by_role("spinbutton", name="Width of a cell in cm").press("Tab")
+    expect(page.get_by_role("button", name="Cut into cells of 9 cm")).to_be_visible()
+    page.get_by_role("button", name="Fewer rows").click()  # rows and columns count again
+    page.get_by_role("button", name="More rows").click()
     page.get_by_role("button", name="Cut into 2 × 2").click()
     wait_for_count(desk, row["id"], count + 3)
 

@@ -18,6 +18,7 @@ export class Editor {
     this.mode = "select";
     this.rows = 2;
     this.columns = 3;
+    this.cell = 0; // about how wide cells of a grid are, cm; 0: rows and columns count
     this.closed = false;
     this.colours = "regions"; // or "cad": as painted in the file
     this.to = null;

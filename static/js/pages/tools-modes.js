@@ -46,9 +46,9 @@ export const MODES = {
   grid: {
     name: "Grid", icon: "grid", letter: "g", pointing: "select", once: true, tip: "Cut regions into rows and columns",
     hint: (e) => (e.selection.length ? `${few(e)} will be cut into even patches, aligned with each other.` : "Click the regions to cut into rows and columns."),
-    missing: (e) => (!e.selection.length ? "Select at least one region" : e.rows * e.columns < 2 ? "One row and one column cut nothing" : ""),
-    words: (e) => `Cut into ${e.rows} \u00d7 ${e.columns}`,
-    edit: (e) => ({ kind: "split_grid", regions: e.selection, rows: e.rows, columns: e.columns }),
+    missing: (e) => (!e.selection.length ? "Select at least one region" : !e.cell && e.rows * e.columns < 2 ? "One row and one column cut nothing" : ""),
+    words: (e) => (e.cell ? `Cut into cells of ${number(e.cell)} cm` : `Cut into ${e.rows} \u00d7 ${e.columns}`),
+    edit: (e) => ({ kind: "split_grid", regions: e.selection, ...(e.cell ? { size_mm: 10 * e.cell } : { rows: e.rows, columns: e.columns }) }),
   },
   cut: {
     name: "Cut", icon: "cut", letter: "c", pointing: "points", path: "line", tip: "Draw a line on the surface",

@@ -93,8 +93,8 @@ export class Toolbar {
   // Drawn anew only when it says something else, so that a field in it keeps its focus and its caret.
   drawFinish() {
     const { editor } = this;
-    const { mode, busy, fault, selection, points, piece, rows, columns, closed, to, level } = editor;
-    const key = JSON.stringify([mode, busy, fault, selection, points.length, piece, rows, columns, closed, to, level, editor.tool.segmentation_id]);
+    const { mode, busy, fault, selection, points, piece, rows, columns, cell, closed, to, level } = editor;
+    const key = JSON.stringify([mode, busy, fault, selection, points.length, piece, rows, columns, cell, closed, to, level, editor.tool.segmentation_id]);
     if (key === this.drawn) return;
     this.drawn = key;
     const quiet = mode === "select" || mode === "box";
@@ -124,7 +124,7 @@ export class Toolbar {
 
   options() {
     const { editor } = this;
-    if (editor.mode === "grid") return [this.count("rows", "rows"), h("span", { "aria-hidden": "true" }, "\u00d7"), this.count("columns", "columns")];
+    if (editor.mode === "grid") return [this.count("rows", "rows"), h("span", { "aria-hidden": "true" }, "\u00d7"), this.count("columns", "columns"), this.cells()];
     if (editor.mode === "cut" && editor.points.length > 2) return h("label.check", {}, h("input", { type: "checkbox", checked: editor.closed, dataset: { key: "closed" }, onchange: (event) => editor.set({ closed: event.currentTarget.checked }) }), "Close the line");
     if (editor.mode === "reassign" && editor.piece) return this.destination();
     return null;
@@ -132,7 +132,7 @@ export class Toolbar {
 
   count(key, words) {
     const { editor } = this;
-    const to = (value) => editor.set({ [key]: Math.max(1, Math.min(MOST_ROWS, Math.round(value) || 1)) });
+    const to = (value) => editor.set({ cell: 0, [key]: Math.max(1, Math.min(MOST_ROWS, Math.round(value) || 1)) });
     return h("span.count", {}, h("button", { type: "button", "aria-label": `Fewer ${words}`, dataset: { key: `${key}-fewer` }, onclick: () => to(editor[key] - 1) }, icon("minus")),
       h("input.field", { type: "number", min: "1", max: String(MOST_ROWS), value: String(editor[key]), "aria-label": `Number of ${words}`, dataset: { key }, onchange: (event) => to(Number(event.currentTarget.value)), onkeydown: (event) => {
         if (event.key !== "Enter") return;
@@ -140,6 +140,17 @@ export class Toolbar {
         editor.inTurn(() => editor.act());
       } }),
       h("button", { type: "button", "aria-label": `More ${words}`, dataset: { key: `${key}-more` }, onclick: () => to(editor[key] + 1) }, icon("plus")), h("span", {}, words));
+  }
+
+  // Instead of rows and columns: how wide the cells should be, as nearly as fits.
+  cells() {
+    const { editor } = this;
+    const to = (field) => editor.set({ cell: Math.max(0, Number(field.value) || 0) });
+    return h("label.count.cells", {}, h("span", {}, "or cells of"), h("input.field", { type: "number", min: "0", step: "any", value: editor.cell ? String(editor.cell) : "", placeholder: "\u2013", "aria-label": "Width of a cell in cm", dataset: { key: "cell" }, onchange: (event) => to(event.currentTarget), onkeydown: (event) => {
+      if (event.key !== "Enter") return;
+      to(event.currentTarget);
+      editor.inTurn(() => editor.act());
+    } }), h("span", {}, "cm"));
   }
 
   destination() {
