@@ -187,7 +187,7 @@ def _outer_loop(ends: Integers, length: Array) -> NDArray[np.bool_]:
 
 
 @kernel
-def _outside(points):  # pragma: no cover - compiled
+def outer_points(points):  # pragma: no cover - compiled
     """Points that may lie on the convex hull: not inside the polygon of those that are farthest out in some directions."""
     ways = 16
     corner, reach = np.zeros(ways, np.int64), np.full(ways, -np.inf)
@@ -211,7 +211,7 @@ def _outside(points):  # pragma: no cover - compiled
 
 def smallest_rectangle(points: Array) -> tuple[Array, Array]:
     """Axes (2, 2) of the rectangle with the smallest area around the points, one side lies on the hull, and its sides (2,)."""
-    points = _outside(np.ascontiguousarray(points)) if len(points) > MANY else points
+    points = outer_points(np.ascontiguousarray(points)) if len(points) > MANY else points
     try:
         hull = points[ConvexHull(points).vertices]
     except QhullError:  # all points on one line

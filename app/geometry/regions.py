@@ -16,6 +16,7 @@ from app.geometry.exact_shapes import CadSurfaces, exact_shapes
 from app.geometry.fitting import NORMAL_WEIGHT, add_up, face_sums
 from app.geometry.main_faces import facing
 from app.geometry.merging import absorb_small, build_tree
+from app.geometry.plan_frame import plan_boxes
 from app.geometry.splitting import Surface, split_large
 from app.geometry.tool import Array, Mesh, Region, RegionGraph, Tool, region_letters
 
@@ -101,6 +102,7 @@ def _graph(mesh: Mesh, labels: NDArray[np.int32], attributes: Attributes) -> Reg
     total, plan = attributes.area.sum(), _plan_area(attributes)
     height, top = attributes.high[:, 2], attributes.high[:, 2].max()
     depth = top - attributes.low[:, 2].min()
+    low, high = plan_boxes(mesh, labels, n)
     return RegionGraph(
         source="mesh",
         shared=_divide(shared, perimeter),
@@ -112,8 +114,8 @@ def _graph(mesh: Mesh, labels: NDArray[np.int32], attributes: Attributes) -> Reg
         curvature=np.clip(attributes.curvature * np.sqrt(total), -1, 1),
         height=1 - (top - height) / depth if depth > 1e-9 * np.sqrt(total) else np.ones(n),
         area=plan / plan.sum(),
-        low=attributes.low[:, :2] / np.sqrt(plan.sum()),
-        high=attributes.high[:, :2] / np.sqrt(plan.sum()),
+        low=low / np.sqrt(plan.sum()),
+        high=high / np.sqrt(plan.sum()),
     )
 
 

@@ -38,7 +38,7 @@ class RegionGraph:
     curvature: Array  # (N,) mesh: clip(kappa * sqrt(total area), -1, 1), + convex; tables: as listed
     height: Array  # (N,) mesh: highest point scaled to [0, 1] over the working surface; tables: z_max as listed
     area: Array  # (N,) mesh: projected area / total projected area; tables: area as listed
-    low: Array  # (N, 2) lower corner of the region's box in plan view (real: row, column)
+    low: Array  # (N, 2) lower corner of the region's box in plan view, mesh: along the part's tightest rectangle (real: row, column)
     high: Array  # (N, 2) upper corner
 
     @property

@@ -7,8 +7,10 @@ import pytest
 
 from app.errors import InvalidInput
 from app.geometry.moulds import Mould, arc, sample_moulds, sphere_patch, straight, translational
+from app.geometry.plan_frame import plan_boxes
 from app.geometry.regions import measure, reading_order
 from app.geometry.tool import Array, Mesh, Tool
+from app.sequencing.problem import problem_for
 
 MOULDS = sample_moulds()
 
@@ -181,7 +183,7 @@ def matched(before: Tool, after: Tool) -> np.ndarray:
 
 @pytest.mark.parametrize("mould", MOULDS, ids=lambda m: m.name)
 def test_rigid_motion_about_z_leaves_the_graph_alone(mould: Mould) -> None:
-    """A quarter turn permutes letters; matched by place, all but the plan boxes must agree."""
+    """A quarter turn permutes letters; matched by place, all must agree, of the plan boxes the gaps around sets of regions."""
     before = measure(mould.mesh, mould.labels)
     for angle, shift in MOTIONS:
         after = measure(rotated_about_z(mould.mesh, angle, np.array(shift)), mould.labels)
@@ -190,6 +192,30 @@ def test_rigid_motion_about_z_leaves_the_graph_alone(mould: Mould) -> None:
             assert np.allclose(getattr(before.graph, name), getattr(after.graph, name)[np.ix_(match, match)], atol=1e-6), name
         for name in ("curvature", "height", "area"):
             assert np.allclose(getattr(before.graph, name), getattr(after.graph, name)[match], atol=1e-6), name
+
+
+@pytest.mark.parametrize("mould", MOULDS, ids=lambda m: m.name)
+def test_rigid_motion_about_z_leaves_the_clean_features_alone(mould: Mould) -> None:
+    """Every feature of every step of some orders."""
+    before = measure(mould.mesh, mould.labels)
+    for angle, shift in (*MOTIONS, (0.7, (0.0, 0.0, 0.0)), (2.9, (0.0, 0.0, 0.0))):
+        after = measure(rotated_about_z(mould.mesh, angle, np.array(shift)), mould.labels)
+        match = matched(before, after)
+        one, other = problem_for(before.graph), problem_for(after.graph)
+        for seed in range(5):
+            order = np.random.default_rng(seed).permutation(before.n)
+            np.testing.assert_allclose(one.feature_sum(order), other.feature_sum(match[order]), atol=1e-6, err_msg=str(angle))
+
+
+def test_boxes_of_an_octagon_follow_its_regions() -> None:
+    """Rectangles along and across its sides are equally tight; the cuts decide, whichever way it is turned."""
+    corner = np.stack([np.cos(np.pi / 8 + np.pi / 4 * np.arange(8)), np.sin(np.pi / 8 + np.pi / 4 * np.arange(8)), np.zeros(8)], axis=1)
+    faces = np.array([[0, 1, 2], [0, 2, 7], [2, 3, 4], [2, 4, 5], [2, 5, 6], [2, 6, 7]], np.int32)
+    labels = np.array([0, 0, 1, 1, 1, 1], np.int32)
+    for angle in (0.0, 0.3, np.pi / 4, 1.3):
+        turned = rotated_about_z(Mesh(corner, faces), angle, np.zeros(3))
+        low, high = plan_boxes(turned, labels, 2)
+        assert sorted(np.prod(high - low, axis=1)) == pytest.approx([1, 1 + np.sqrt(2)])  # along the cut; across it 1.7 and 3.4
 
 
 @pytest.mark.parametrize("mould", MOULDS, ids=lambda m: m.name)
