@@ -15,7 +15,7 @@ LEVEL = np.radians(0.4)  # the same for what is called a plane whatever else bel
 EXACTLY = np.radians(1)  # the same for what looks round as a whole: a large flat face with its fillet is nearly a large cylinder
 MOSTLY = 0.6  # share of the area from which a region with something bent at its edge counts as a flat face
 FEW, SURELY = 500, 0.4  # triangles looked at first, and the share of them below which the region isn't mostly flat
-ROUNDS, SETTLED = 60, 1e-10
+ROUNDS, SETTLED, ROUGHLY = 60, 1e-10, 1e-4  # the last for the triangles looked at first
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ def _mostly(told: Callable[[int], tuple[Array, Array]], within: float) -> Array 
     """
     limit = np.cos(within)
     normals, weight = told(FEW)  # enough to see that a region bends
-    few = _median(normals, weight)
+    few = _median(normals, weight, ROUGHLY)
     if few is None or weight[normals @ few > limit].sum() < SURELY * weight.sum():
         return None
     normals, weight = told(0)
@@ -126,17 +126,17 @@ def _mostly(told: Callable[[int], tuple[Array, Array]], within: float) -> Array 
     return None if median is None or weight[normals @ median > limit].sum() < MOSTLY * weight.sum() else median
 
 
-def _median(normals: Array, weight: Array) -> Array | None:
+def _median(normals: Array, weight: Array, settled: float = SETTLED) -> Array | None:
     """Geometric median of unit vectors, itself one; None where they look all ways alike."""
     median = weight @ normals
     if np.linalg.norm(median) <= 1e-6 * weight.sum():
         return None
-    return _settled(np.ascontiguousarray(normals), np.ascontiguousarray(weight), median / np.linalg.norm(median))
+    return _settled(np.ascontiguousarray(normals), np.ascontiguousarray(weight), median / np.linalg.norm(median), settled)
 
 
 @kernel
-def _settled(normals, weight, median):  # pragma: no cover - compiled
-    """Weiszfeld's iteration on the unit sphere."""
+def _settled(normals, weight, median, enough):  # pragma: no cover - compiled
+    """Weiszfeld's iteration on the unit sphere, until a step moves less than enough."""
     for _ in range(ROUNDS):
         step = np.zeros(3)
         for i in range(len(normals)):
@@ -147,7 +147,7 @@ def _settled(normals, weight, median):  # pragma: no cover - compiled
         step /= np.sqrt(np.sum(step * step))
         moved = np.sqrt(np.sum((step - median) ** 2))
         median = step
-        if moved < SETTLED:
+        if moved < enough:
             break
     return median
 
